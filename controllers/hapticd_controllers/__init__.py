@@ -1,0 +1,1 @@
+"""Built-in laws, one module a law."""

@@ -1,0 +1,167 @@
+"""Every key of the configuration file, with its unit, bounds and meaning.
+
+Driver options and law parameters are kept as plain tables here; the driver's and the law's own models check them
+when the file is loaded (`hapticd.config.loading`).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+MAX_WALLS = 8
+"""Most walls in a scene: the size of a tick record is fixed when the ring is made."""
+
+Axis = Literal["x", "y", "z"]
+
+
+class Table(BaseModel):
+    """Base of every table: strict types, no unknown keys, no NaN or infinity, never changed after loading."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class LoopConfig(Table):
+    """[loop]: how fast the control loop runs and how hard it insists on real time."""
+
+    rate_hz: float = Field(1000.0, ge=100.0, le=8000.0, description="ticks a second [Hz]")
+    realtime: Literal["required", "preferred", "off"] = Field(
+        "preferred",
+        description="required: refuse to start without SCHED_FIFO and locked memory; preferred: run and warn; off",
+    )
+    priority: int = Field(80, ge=1, le=98, description="SCHED_FIFO priority")
+    cpu: int | None = Field(None, ge=0, description="processor to stay on; unset: the last one this process may use")
+    law_budget: float = Field(
+        0.5, gt=0.0, le=1.0, description="share of the period that a tick may compute; 3 ticks of 10 above it fail the law"
+    )
+
+    @property
+    def period_ns(self) -> int:
+        """Time between deadlines, whole nanoseconds."""
+        return round(1e9 / self.rate_hz)
+
+    @property
+    def period_s(self) -> float:
+        """Time between deadlines [s]."""
+        return self.period_ns * 1e-9
+
+
+class DeviceConfig(Table):
+    """[device]: which driver, and its own options."""
+
+    driver: str = Field("loopback", min_length=1, description="installed driver, see `hapticd devices`")
+    options: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
+    accept_no_watchdog: bool = Field(
+        False,
+        description="run a real device that keeps its last force when this computer dies; read docs/safety.md first",
+    )
+
+
+class WallChange(Table):
+    """One entry of scene.walls.changes: new values from some time on."""
+
+    at_s: float = Field(ge=0.0, description="seconds after the wall's first tick [s]")
+    stiffness_n_per_m: float | None = Field(None, ge=0.0, le=1e9, description="new stiffness [N/m]")
+    damping_n_s_per_m: float | None = Field(None, ge=-1e6, le=1e6, description="new damping [N s/m]")
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> WallChange:
+        if self.stiffness_n_per_m is None and self.damping_n_s_per_m is None:
+            raise ValueError("name a new stiffness_n_per_m or damping_n_s_per_m")
+        return self
+
+
+class WallConfig(Table):
+    """[[scene.walls]]: a plane across one axis that pushes towards its free side."""
+
+    axis: Axis = Field("z", description="axis that the plane is normal to")
+    free_side: Literal["positive", "negative"] = Field("positive", description="side of the plane that is free")
+    position_m: float = Field(0.0, ge=-10.0, le=10.0, description="where the plane is on the axis [m]")
+    stiffness_n_per_m: float = Field(ge=0.0, le=1e9, description="spring stiffness [N/m]")
+    damping_n_s_per_m: float = Field(
+        0.0, ge=-1e6, le=1e6, description="damping of the wall itself [N s/m]; negative makes the wall active"
+    )
+    changes: tuple[WallChange, ...] = Field((), description="changes of stiffness or damping over time")
+
+    @model_validator(mode="after")
+    def _changes_in_order(self) -> WallConfig:
+        times = [change.at_s for change in self.changes]
+        if any(later <= earlier for earlier, later in zip(times, times[1:], strict=False)):
+            raise ValueError("changes must be in order of at_s, each later than the one before")
+        return self
+
+
+class SceneConfig(Table):
+    """[scene]: the walls."""
+
+    walls: tuple[WallConfig, ...] = Field((), max_length=MAX_WALLS, description="the walls, at most eight")
+
+
+class VelocityConfig(Table):
+    """[velocity]: how velocity is estimated from positions."""
+
+    estimator: Literal["difference", "lowpass", "foaw", "device"] = Field(
+        "difference",
+        description="difference over `samples`; first-order low-pass of it; first-order adaptive window; the device's own",
+    )
+    samples: int = Field(1, ge=1, le=64, description="samples that the difference spans; longest window of foaw")
+    cutoff_hz: float = Field(200.0, gt=0.0, le=1e5, description="corner of the low-pass [Hz]")
+    noise_m: float | None = Field(
+        None, ge=0.0, le=0.1, description="foaw: error bound of a position [m]; unset: the device's resolution"
+    )
+
+
+class ControllerConfig(Table):
+    """[controller]: which law, and its own parameters."""
+
+    law: str = Field("energy-cycle", min_length=1, description="installed law or importable module, see `hapticd controllers`")
+    params: dict[str, Any] = Field(default_factory=dict, description="the law's own parameters")
+
+
+class SafetyConfig(Table):
+    """[safety]: what the guard allows."""
+
+    profile: Literal["device", "simulation"] = Field(
+        "device", description="simulation lifts force and speed limits; only simulated devices accept it"
+    )
+    max_force_n: float | None = Field(
+        None, gt=0.0, le=1000.0, description="largest force magnitude [N]; unset: the device's own limit"
+    )
+    max_axis_force_n: float | None = Field(
+        None, gt=0.0, le=1000.0, description="largest force along one axis [N]; unset: as max_force_n"
+    )
+    max_speed_m_per_s: float | None = Field(
+        None, gt=0.0, le=100.0, description="over-speed stop [m/s]; unset: 2 m/s on a real device, none on a simulated one"
+    )
+    ramp_s: float = Field(0.05, ge=0.001, le=1.0, description="duration of every force ramp: arming, switch, release [s]")
+    auto_arm: bool = Field(False, description="arm a real device by itself at start and after it reconnects")
+    supervisor_stall_s: float = Field(
+        10.0, ge=0.1, le=3600.0, description="release the force when the supervisor has been silent this long [s]"
+    )
+
+
+class TelemetryConfig(Table):
+    """[telemetry]: where and how often measurements are published."""
+
+    ipc: bool = Field(True, description="publish on the instance's ipc endpoint")
+    tcp: str | None = Field(
+        "tcp://127.0.0.1:9872", pattern=r"^tcp://[^:]+:\d+$|^tcp://\[[0-9a-fA-F:]+\]:\d+$", description="extra TCP endpoint; unset with \"\""
+    )
+    batch_ticks: int = Field(20, ge=1, le=1000, description="most ticks in one message; 20 ms at the longest")
+    every_ticks: int = Field(1, ge=1, le=10000, description="publish one tick in this many; cycles and events always")
+    send_high_water: int = Field(
+        1000, ge=10, le=100000, description="messages kept for a slow subscriber before it loses new ones"
+    )
+
+
+class Config(Table):
+    """A whole configuration file."""
+
+    loop: LoopConfig = Field(default_factory=LoopConfig)
+    device: DeviceConfig = Field(default_factory=DeviceConfig)
+    scene: SceneConfig = Field(default_factory=SceneConfig)
+    velocity: VelocityConfig = Field(default_factory=VelocityConfig)
+    controller: ControllerConfig = Field(default_factory=ControllerConfig)
+    safety: SafetyConfig = Field(default_factory=SafetyConfig)
+    telemetry: TelemetryConfig = Field(default_factory=TelemetryConfig)

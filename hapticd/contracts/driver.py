@@ -1,0 +1,254 @@
+"""What a haptic device is: five states, checks in the public methods, hooks that a device fills in.
+
+    open -> (calibrate) -> enable -> read/write ... -> disable -> close
+
+Each step may be called twice; `disable` leaves the device without force whatever has happened. Public methods own
+order and checks, so that a driver only fills in the hooks whose names start with an underscore.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from hapticd.contracts.errors import DriverStateError
+
+
+class DriverOptions(BaseModel):
+    """Base of every driver's options, the keys of [device.options]: strict, frozen, finite, no unknown keys."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+OptionsT = TypeVar("OptionsT", bound=DriverOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """What a device declares of itself once it is open.
+
+    Attributes:
+        model: what it is, for people.
+        serial: serial number, "" when it has none.
+        axes: name of each translation axis in the order of positions and forces; a device with a single axis has it
+            wherever the scene puts the wall.
+        max_force_n: largest force that may be commanded, magnitude over all axes [N]; `inf` only when simulated.
+        resolution_m: smallest step that the position can show [m]; 0 when continuous.
+        workspace_m: lowest and highest position of each axis [m].
+        nominal_rate_hz: rate the device is made for [Hz].
+        safe_damping_n_s_per_m: digital damping that is stable on this device at its nominal rate, for the fallback.
+        host_silence_ms: after how long without the host the device drops its force by itself [ms]; None: never.
+        simulated: no hand can be hurt: arms itself, and the simulation safety profile is allowed.
+        buttons: number of buttons.
+        has_gripper, has_orientation, has_velocity: whether samples carry them.
+        has_clock: samples carry the device's own time.
+        has_sequence: samples carry the device's own count.
+    """
+
+    model: str
+    serial: str
+    axes: tuple[str, ...]
+    max_force_n: float
+    resolution_m: float
+    workspace_m: tuple[tuple[float, float], ...]
+    nominal_rate_hz: float
+    safe_damping_n_s_per_m: float
+    host_silence_ms: float | None
+    simulated: bool = False
+    buttons: int = 0
+    has_gripper: bool = False
+    has_orientation: bool = False
+    has_velocity: bool = False
+    has_clock: bool = False
+    has_sequence: bool = False
+
+    @property
+    def detects_frozen(self) -> bool:
+        """Whether a device that repeats old data can be told from one that stands still."""
+        return self.has_clock or self.has_sequence
+
+
+class Sample:
+    """The newest state of a device; one object, filled anew at each read.
+
+    Attributes:
+        position_m: position of each axis [m].
+        velocity_m_per_s: the device's own velocity of each axis [m/s]; zeros unless `has_velocity`.
+        time_ns: device time [ns]; -1 without a clock.
+        sequence: device count; -1 without one.
+        buttons: bit i is button i.
+        gripper_m: opening [m]; 0 without one.
+        orientation: rotation matrix, row by row (9 elements); identity without a wrist.
+    """
+
+    __slots__ = ("buttons", "gripper_m", "orientation", "position_m", "sequence", "time_ns", "velocity_m_per_s")
+
+    def __init__(self, axes: int) -> None:
+        self.position_m = [0.0] * axes
+        self.velocity_m_per_s = [0.0] * axes
+        self.time_ns = -1
+        self.sequence = -1
+        self.buttons = 0
+        self.gripper_m = 0.0
+        self.orientation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+
+
+class DriverState(enum.Enum):
+    """Where in its life a driver is."""
+
+    CLOSED = "closed"
+    OPEN = "open"
+    ENABLED = "enabled"
+
+
+class Driver(ABC, Generic[OptionsT]):
+    """A device behind a driver.
+
+    Args:
+        options: the device's options, an instance of `Options`.
+        period_s: time between ticks [s].
+    """
+
+    Options: ClassVar[type[DriverOptions]] = DriverOptions
+
+    def __init__(self, options: OptionsT, period_s: float) -> None:
+        self.options = options
+        self.period_s = period_s
+        self.state = DriverState.CLOSED
+        self._info: DeviceInfo | None = None
+        self._limit_squared = 0.0
+        self._axes = 0
+
+    @property
+    def info(self) -> DeviceInfo:
+        """What the device declares.
+
+        Raises:
+            DriverStateError: the driver is not open.
+        """
+        if self._info is None:
+            raise DriverStateError("the device is not open")
+        return self._info
+
+    def open(self) -> DeviceInfo:
+        """Find the device and learn what it is; no force, no motion.
+
+        Raises:
+            DriverError: not found, not permitted, busy, or it makes no sense.
+        """
+        if self.state is DriverState.CLOSED:
+            try:
+                self._info = self._open()
+            except BaseException:
+                self._close()
+                raise
+            # A simulated device saturates by itself; a hand is protected here, behind the guard.
+            limit_n = math.inf if self._info.simulated else self._info.max_force_n
+            self._limit_squared = (limit_n * (1.0 + 1e-9)) ** 2
+            self._axes = len(self._info.axes)
+            self.state = DriverState.OPEN
+        return self.info
+
+    def calibrate(self) -> None:
+        """Calibrate or home the device. The one call that may move an arm by itself.
+
+        Raises:
+            DriverStateError: not open, or force is enabled.
+            DriverError: the device failed to calibrate.
+        """
+        if self.state is not DriverState.OPEN:
+            raise DriverStateError(f"calibrate: the device is {self.state.value}, it must be open without force")
+        self._calibrate()
+
+    def enable(self) -> None:
+        """Let the device take forces; the force is zero until the first write.
+
+        Raises:
+            DriverStateError: not open.
+            DriverError: the device refuses, for example while it is not calibrated.
+        """
+        if self.state is DriverState.CLOSED:
+            raise DriverStateError("enable: the device is not open")
+        if self.state is DriverState.OPEN:
+            self._enable()
+            self.state = DriverState.ENABLED
+
+    def read(self) -> Sample:
+        """The newest state of the device; never waits longer than a tick allows.
+
+        Raises:
+            DriverError: lost, late, or it makes no sense.
+        """
+        if self.state is DriverState.CLOSED:
+            raise DriverStateError("read: the device is not open")
+        return self._read()
+
+    def write(self, force_n: Sequence[float]) -> None:
+        """Apply a force until the next write.
+
+        Args:
+            force_n: force on the device along each axis [N].
+
+        Raises:
+            DriverStateError: not enabled, wrong number of axes, not finite, or beyond the device's limit.
+            DriverError: lost or late.
+        """
+        if self.state is not DriverState.ENABLED:
+            raise DriverStateError(f"write: the device is {self.state.value}, not enabled")
+        squared = 0.0
+        for newton in force_n:
+            squared += newton * newton
+        # A NaN fails every comparison, so it is refused here as well.
+        if not (squared <= self._limit_squared and squared < math.inf) or len(force_n) != self._axes:
+            raise DriverStateError(f"write: {list(force_n)} N is not a force within {self._info.max_force_n if self._info else 0.0:.6g} N")
+        self._write(force_n)
+
+    def disable(self) -> None:
+        """Take the force away, from any state, after any error; never raises."""
+        if self.state is DriverState.CLOSED:
+            return
+        self.state = DriverState.OPEN
+        with contextlib.suppress(Exception):  # whatever the device says now, the caller is already letting go
+            self._disable()
+
+    def close(self) -> None:
+        """Take the force away and give the device back; never raises."""
+        self.disable()
+        self.state = DriverState.CLOSED
+        self._info = None
+        with contextlib.suppress(Exception):
+            self._close()
+
+    @abstractmethod
+    def _open(self) -> DeviceInfo:
+        """Find the device, greet it, learn its axes and limits."""
+
+    def _calibrate(self) -> None:  # noqa: B027 - most devices know where they are
+        """Calibrate or home; may move."""
+
+    @abstractmethod
+    def _enable(self) -> None:
+        """Allow forces; the first force is zero."""
+
+    @abstractmethod
+    def _read(self) -> Sample:
+        """Return the newest state, the same object every time."""
+
+    @abstractmethod
+    def _write(self, force_n: Sequence[float]) -> None:
+        """Apply a force that is finite, within limits, one element an axis."""
+
+    @abstractmethod
+    def _disable(self) -> None:
+        """Take the force away; must work from any state, twice, after an error, and not raise."""
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Release what `_open` took, even half opened; must not raise."""
