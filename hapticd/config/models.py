@@ -146,7 +146,7 @@ class TelemetryConfig(Table):
 
     ipc: bool = Field(True, description="publish on the instance's ipc endpoint")
     tcp: str | None = Field(
-        "tcp://127.0.0.1:9872", pattern=r"^tcp://[^:]+:\d+$|^tcp://\[[0-9a-fA-F:]+\]:\d+$", description="extra TCP endpoint; unset with \"\""
+        None, pattern=r"^tcp://[^:]+:\d+$|^tcp://\[[0-9a-fA-F:]+\]:\d+$", description="extra TCP endpoint, for example tcp://127.0.0.1:9872; unset: none"
     )
     batch_ticks: int = Field(20, ge=1, le=1000, description="most ticks in one message; 20 ms at the longest")
     every_ticks: int = Field(1, ge=1, le=10000, description="publish one tick in this many; cycles and events always")
