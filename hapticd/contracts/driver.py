@@ -137,6 +137,16 @@ class Driver(ABC, Generic[OptionsT]):
             raise DriverStateError("the device is not open")
         return self._info
 
+    def place(self, wall_m: float, outward: int) -> None:
+        """Be told, before `open`, where the first wall stands on the device's single axis.
+
+        Only a simulated device cares: it starts relative to that wall.
+
+        Args:
+            wall_m: position of the wall's plane [m].
+            outward: +1 when the free side is the positive one, -1 otherwise.
+        """
+
     def open(self) -> DeviceInfo:
         """Find the device and learn what it is; no force, no motion.
 

@@ -1,0 +1,51 @@
+"""What happened: the codes of `hapticd/event` messages. Documented in docs/faults.md."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+
+class EventCode(enum.IntEnum):
+    """1xx: life; 2xx: faults that take the force away; 3xx: warnings."""
+
+    STARTED = 100
+    ARMED = 101
+    DISARMED = 102
+    SWITCHED = 103
+    CLEARED = 104
+    STOPPING = 105
+    REFUSED = 106
+
+    LAW_FAILED = 200
+    LAW_OVER_BUDGET = 201
+    OVER_SPEED = 202
+    SAMPLE_IMPOSSIBLE = 203
+    DEVICE_LOST = 204
+    DEVICE_FROZEN = 205
+    DEVICE_FAULT = 206
+    SUPERVISOR_STALLED = 207
+    CONTROL_LOST = 208
+
+    OVERRUN_BURST = 300
+    RING_DROPPED = 301
+    NOT_REALTIME = 302
+
+
+@dataclass(slots=True)
+class Event:
+    """One event.
+
+    Attributes:
+        code: what happened.
+        text: one line for people.
+        seq: tick at which it happened.
+        deadline_ns: CLOCK_MONOTONIC time of that tick [ns].
+        fields: numbers and names that belong to it.
+    """
+
+    code: int
+    text: str
+    seq: int
+    deadline_ns: int
+    fields: dict[str, float | int | str] = field(default_factory=dict)
