@@ -1,25 +1,24 @@
 """Every key of the configuration file, with its unit, bounds and meaning.
 
-Driver options and law parameters are kept as plain tables here; the driver's and the law's own models check them
-when the file is loaded (`hapticd.config.loading`).
+Driver options and law parameters are kept as plain tables here; the driver's and the law's own models check
+them when the file is loaded (`hapticd.config.loading`).
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import ipaddress
+import re
+from itertools import pairwise
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from hapticd.contracts.table import Table
 
 MAX_WALLS = 8
 """Most walls in a scene: the size of a tick record is fixed when the ring is made."""
 
 Axis = Literal["x", "y", "z"]
-
-
-class Table(BaseModel):
-    """Base of every table: strict types, no unknown keys, no NaN or infinity, never changed after loading."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class LoopConfig(Table):
@@ -28,12 +27,15 @@ class LoopConfig(Table):
     rate_hz: float = Field(1000.0, ge=100.0, le=8000.0, description="ticks a second [Hz]")
     realtime: Literal["required", "preferred", "off"] = Field(
         "preferred",
-        description="required: refuse to start without SCHED_FIFO and locked memory; preferred: run and warn; off",
+        description="required: do not start without SCHED_FIFO and locked memory; preferred: run and warn; off",
     )
     priority: int = Field(80, ge=1, le=98, description="SCHED_FIFO priority")
     cpu: int | None = Field(None, ge=0, description="processor to stay on; unset: the last one this process may use")
     law_budget: float = Field(
-        0.5, gt=0.0, le=1.0, description="share of the period that a tick may compute; 3 ticks of 10 above it fail the law"
+        0.5,
+        gt=0.0,
+        le=1.0,
+        description="share of the period that a tick may compute; 3 ticks of 10 above it fail the law",
     )
 
     @property
@@ -54,7 +56,7 @@ class DeviceConfig(Table):
     options: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
     accept_no_watchdog: bool = Field(
         False,
-        description="run a real device that keeps its last force when this computer dies; read docs/safety.md first",
+        description="run a real device that keeps its last force when this computer dies (docs/safety.md)",
     )
 
 
@@ -68,7 +70,7 @@ class WallChange(Table):
     @model_validator(mode="after")
     def _changes_something(self) -> WallChange:
         if self.stiffness_n_per_m is None and self.damping_n_s_per_m is None:
-            raise ValueError("name a new stiffness_n_per_m or damping_n_s_per_m")
+            raise ValueError("must name a new stiffness_n_per_m or damping_n_s_per_m")
         return self
 
 
@@ -84,12 +86,12 @@ class WallConfig(Table):
     )
     changes: tuple[WallChange, ...] = Field((), description="changes of stiffness or damping over time")
 
-    @model_validator(mode="after")
-    def _changes_in_order(self) -> WallConfig:
-        times = [change.at_s for change in self.changes]
-        if any(later <= earlier for earlier, later in zip(times, times[1:], strict=False)):
-            raise ValueError("changes must be in order of at_s, each later than the one before")
-        return self
+    @field_validator("changes")
+    @classmethod
+    def _changes_in_order(cls, changes: tuple[WallChange, ...]) -> tuple[WallChange, ...]:
+        if any(later.at_s <= earlier.at_s for earlier, later in pairwise(changes)):
+            raise ValueError("must be in order of at_s, each later than the one before")
+        return changes
 
 
 class SceneConfig(Table):
@@ -103,19 +105,26 @@ class VelocityConfig(Table):
 
     estimator: Literal["difference", "lowpass", "foaw", "device"] = Field(
         "difference",
-        description="difference over `samples`; first-order low-pass of it; first-order adaptive window; the device's own",
+        description="difference over `samples`, low-pass of it, first-order adaptive window, or the device's own",
     )
     samples: int = Field(1, ge=1, le=64, description="samples that the difference spans; longest window of foaw")
     cutoff_hz: float = Field(200.0, gt=0.0, le=1e5, description="corner of the low-pass [Hz]")
     noise_m: float | None = Field(
-        None, ge=0.0, le=0.1, description="foaw: error bound of a position [m]; unset: the device's resolution"
+        None,
+        ge=0.0,
+        le=0.1,
+        description="foaw: error bound of a position [m]; unset: the device's resolution",
     )
 
 
 class ControllerConfig(Table):
     """[controller]: which law, and its own parameters."""
 
-    law: str = Field("energy-cycle", min_length=1, description="installed law or importable module, see `hapticd controllers`")
+    law: str = Field(
+        "energy-cycle",
+        min_length=1,
+        description="installed law or importable module, see `hapticd controllers`",
+    )
     params: dict[str, Any] = Field(default_factory=dict, description="the law's own parameters")
 
 
@@ -132,12 +141,20 @@ class SafetyConfig(Table):
         None, gt=0.0, le=1000.0, description="largest force along one axis [N]; unset: as max_force_n"
     )
     max_speed_m_per_s: float | None = Field(
-        None, gt=0.0, le=100.0, description="over-speed stop [m/s]; unset: 2 m/s on a real device, none on a simulated one"
+        None,
+        gt=0.0,
+        le=100.0,
+        description="over-speed stop [m/s]; unset: 2 m/s on a real device, none on a simulated one",
     )
-    ramp_s: float = Field(0.05, ge=0.001, le=1.0, description="duration of every force ramp: arming, switch, release [s]")
+    ramp_s: float = Field(
+        0.05, ge=0.001, le=1.0, description="duration of every force ramp: arming, switch, release [s]"
+    )
     auto_arm: bool = Field(False, description="arm a real device by itself at start and after it reconnects")
     supervisor_stall_s: float = Field(
-        10.0, ge=0.1, le=3600.0, description="release the force when the supervisor has been silent this long [s]"
+        10.0,
+        ge=0.1,
+        le=3600.0,
+        description="release the force when the supervisor has been silent this long [s]",
     )
 
 
@@ -146,13 +163,29 @@ class TelemetryConfig(Table):
 
     ipc: bool = Field(True, description="publish on the instance's ipc endpoint")
     tcp: str | None = Field(
-        None, pattern=r"^tcp://[^:]+:\d+$|^tcp://\[[0-9a-fA-F:]+\]:\d+$", description="extra TCP endpoint, for example tcp://127.0.0.1:9872; unset: none"
+        None, description="extra TCP endpoint on this host, for example tcp://127.0.0.1:9872; unset: none"
     )
     batch_ticks: int = Field(20, ge=1, le=1000, description="most ticks in one message; 20 ms at the longest")
     every_ticks: int = Field(1, ge=1, le=10000, description="publish one tick in this many; cycles and events always")
     send_high_water: int = Field(
         1000, ge=10, le=100000, description="messages kept for a slow subscriber before it loses new ones"
     )
+
+    @field_validator("tcp")
+    @classmethod
+    def _stays_on_this_host(cls, endpoint: str | None) -> str | None:
+        if endpoint is None:
+            return None
+        found = re.fullmatch(r"tcp://(?:\[([0-9a-f:]+)\]|([0-9.]+)):([0-9]{1,5})", endpoint, re.IGNORECASE | re.ASCII)
+        try:
+            address = ipaddress.ip_address(found[1] or found[2]) if found else None
+        except ValueError:
+            address = None
+        if found is None or address is None or not 1 <= int(found[3]) <= 65535:
+            raise ValueError("must be an address and a port, such as tcp://127.0.0.1:9872")
+        if not address.is_loopback:
+            raise ValueError("must stay on this host, such as tcp://127.0.0.1:9872: measurements are not encrypted")
+        return endpoint
 
 
 class Config(Table):

@@ -16,15 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict
-
 from hapticd.contracts.errors import DriverStateError
+from hapticd.contracts.table import Table
 
 
-class DriverOptions(BaseModel):
+class DriverOptions(Table):
     """Base of every driver's options, the keys of [device.options]: strict, frozen, finite, no unknown keys."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 OptionsT = TypeVar("OptionsT", bound=DriverOptions)

@@ -19,21 +19,19 @@ Signs: x < 0 is inside the wall; a positive force pushes the device out.
 
 from __future__ import annotations
 
+import functools
 import typing
 from types import ModuleType
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
-
 from hapticd.contracts.errors import PluginError
+from hapticd.contracts.table import Table
 
 Scalar = float | int | bool
 
 
-class LawParams(BaseModel):
+class LawParams(Table):
     """Base of every law's parameters: strict, frozen, finite, no unknown keys."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class LawTick:
@@ -103,6 +101,7 @@ class LawSnapshot:
         self.damping_n_s_per_m = damping_n_s_per_m
 
 
+@functools.cache
 def state_fields(law: ModuleType) -> dict[str, type[Scalar]]:
     """Names and types of the scalar fields of a law's state, in declaration order.
 
@@ -136,10 +135,14 @@ def scalar_params(params: LawParams) -> dict[str, Scalar]:
     return scalars
 
 
+@functools.cache
+def _plain_class(name: str, fields: tuple[str, ...]) -> type[Any]:
+    return type(name, (), {"__slots__": fields})
+
+
 def plain_object(name: str, fields: dict[str, Scalar]) -> Any:
     """A slotted object with these fields: what a law reads and writes while it runs interpreted."""
-    cls = type(name, (), {"__slots__": tuple(fields)})
-    plain = cls()
+    plain = _plain_class(name, tuple(fields))()
     for field, value in fields.items():
         setattr(plain, field, value)
     return plain

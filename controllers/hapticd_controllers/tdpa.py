@@ -1,0 +1,96 @@
+"""Time-domain passivity control.
+
+Hannaford & Ryu, "Time-domain passivity control of haptic interfaces", IEEE T-RA 18(1), 2002, eqs. 6-8,
+with the bounds that keep it usable near zero speed (docs/controllers.md, "A fair TDPA").
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from hapticd.contracts.law import LawParams
+
+OBSERVER_EXACT, OBSERVER_PRINTED = range(2)
+RESET_CONTACT, RESET_NEVER = range(2)
+
+LIMIT = 1e12
+"""No energy [J], damping [N s/m] or damping force [N] grows beyond this, so that nothing ever overflows."""
+
+
+class Params(LawParams):
+    """Bounds of the passivity controller; with all of them off it is the published one."""
+
+    damping_cap_n_s_per_m: float = Field(
+        50.0, ge=0.0, le=1e9, description="largest damping that may be injected [N s/m]; 0: unbounded, as published"
+    )
+    min_speed_m_per_s: float = Field(
+        1e-3, ge=0.0, le=10.0, description="below this speed the debt waits, since v^2 divides it [m/s]; 0: as published"
+    )
+    carry_debt: bool = Field(
+        True, description="a debt that the bounds left unpaid is paid later; false: it is forgiven at the next tick"
+    )
+    reset: Literal["contact", "never"] = Field(
+        "contact", description="contact: a credit ends with the contact; never: it is kept for ever, as published"
+    )
+    observer: Literal["exact", "printed"] = Field(
+        "exact",
+        description="exact: -F(n-1)(x(n)-x(n-1)) with the applied force; printed: -F(n) v(n) dt, blind to the hold's leak",
+    )
+
+
+class State:
+    """What the passivity observer remembers."""
+
+    energy_j: float  # observed at the port, after dissipation; < 0 is energy we generated
+    damping_n_s_per_m: float  # injected at the last tick
+    speed_m_per_s: float  # at the last tick, for the printed observer
+
+
+def start(state: Any, params: Any, snapshot: Any) -> None:
+    """Take over: a debt is carried over, a credit is not."""
+    state.energy_j = -snapshot.debt_j
+    if state.energy_j > 0.0:
+        state.energy_j = 0.0
+    if state.energy_j < -LIMIT:
+        state.energy_j = -LIMIT
+    state.damping_n_s_per_m = 0.0
+    state.speed_m_per_s = 0.0
+
+
+def step(state: Any, params: Any, tick: Any) -> float:
+    """The contact's own force plus just enough damping to pay the energy debt.  -> force on the device [N]."""
+    velocity = _bounded(tick.velocity_m_per_s)
+    if not params.carry_debt and state.energy_j < 0.0:
+        state.energy_j = 0.0
+    if params.observer == OBSERVER_EXACT:
+        flow_j = -tick.applied_n * tick.moved_m  # E(n) = E(n-1) - F(n-1) (x(n) - x(n-1))
+    else:
+        flow_j = (
+            state.damping_n_s_per_m * state.speed_m_per_s * state.speed_m_per_s - tick.contact_n * velocity
+        ) * tick.dt_s
+    state.energy_j = _bounded(state.energy_j + _bounded(flow_j))
+    state.speed_m_per_s = abs(velocity)
+    state.damping_n_s_per_m = 0.0
+    if not tick.in_contact:
+        if params.reset == RESET_CONTACT and state.energy_j > 0.0:
+            state.energy_j = 0.0
+        return 0.0
+    force_n: float = tick.contact_n
+    payable_per_damping = velocity * velocity * tick.dt_s
+    if state.energy_j < 0.0 and state.speed_m_per_s >= params.min_speed_m_per_s and payable_per_damping > 0.0:
+        damping = _bounded(-state.energy_j / payable_per_damping)  # alpha(n)
+        if params.damping_cap_n_s_per_m > 0.0 and damping > params.damping_cap_n_s_per_m:
+            damping = params.damping_cap_n_s_per_m
+        state.damping_n_s_per_m = damping
+        force_n -= _bounded(damping * velocity)
+    return force_n
+
+
+def _bounded(value: float) -> float:
+    if value > LIMIT:
+        return LIMIT
+    if value < -LIMIT:
+        return -LIMIT
+    return value

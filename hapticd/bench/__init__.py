@@ -1,0 +1,1 @@
+"""What parts of the service cost on this machine, next to a reference measured in the same run."""

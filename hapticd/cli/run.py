@@ -1,0 +1,36 @@
+"""`hapticd run`: the daemon in the foreground."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from pathlib import Path
+
+import typer
+
+from hapticd.config.loading import load
+from hapticd.share import default_config
+from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
+
+
+def run(
+    config: Path | None = typer.Option(
+        None, "--config", "-c", help="Configuration file; /etc/hapticd/hapticd.toml or the shipped one when not given."
+    ),
+    instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of this daemon, one a device."),
+    watch: bool = typer.Option(False, "--watch", help="Show live what it measures; end both with q."),
+) -> None:
+    """Run the daemon in the foreground until it is interrupted.
+
+    Example: hapticd run --config config/hapticd.toml
+    """
+    path = config or default_config()
+    loaded = load(path)
+    if watch:
+        from hapticd.cli.watched import run_watched
+
+        raise typer.Exit(run_watched(path, instance))
+    from hapticd.supervisor.service import Service
+
+    logging.basicConfig(level=logging.INFO, format="%(levelname)-7s %(message)s", stream=sys.stderr)
+    raise typer.Exit(Service(loaded, instance).run())

@@ -1,0 +1,190 @@
+"""Read a configuration file and check all of it at once, the driver's options and the law's parameters included."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
+
+from hapticd import registry
+from hapticd.config.models import Config, ControllerConfig, DeviceConfig
+from hapticd.config.problems import Problems, nearest
+from hapticd.contracts.driver import Driver, DriverOptions
+from hapticd.contracts.errors import ConfigError, PluginError
+from hapticd.contracts.law import LawParams
+
+PluginT = TypeVar("PluginT")
+
+_LARGEST_FILE = 1 << 20
+_MAKE_IMPORTABLE = (
+    "; install its package where hapticd is installed, or put its directory on PYTHONPATH"
+    " (the configuration's directory is not searched)"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedConfig:
+    """A configuration that can be used.
+
+    Attributes:
+        config: the file's own keys, defaults filled in.
+        driver: the driver's class.
+        options: the driver's options.
+        law: the law's module.
+        params: the law's parameters.
+        path: the file; what errors call it when it was no file.
+        text: what the file said; `parse(text, str(path))` gives this configuration again in another process.
+    """
+
+    config: Config
+    driver: type[Driver[Any]]
+    options: DriverOptions
+    law: ModuleType
+    params: LawParams
+    path: Path
+    text: str
+
+    @property
+    def sha256(self) -> str:
+        """What `sha256sum FILE` prints."""
+        return hashlib.sha256(self.text.encode("utf-8", "surrogatepass")).hexdigest()
+
+    @property
+    def hash(self) -> str:
+        """The first 12 digits of `sha256`: what status messages carry."""
+        return self.sha256[:12]
+
+
+def load(path: Path | str) -> LoadedConfig:
+    """Read and check a configuration file.
+
+    Raises:
+        ConfigError: it cannot be read or used; carries every problem, one line each.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            raw = file.read(_LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise ConfigError(f"{path}: is a directory, not a file") from None
+    except PermissionError:
+        raise ConfigError(f"{path}: this user may not read it") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise ConfigError(f"{path}: cannot be read: {reason}") from None
+    if len(raw) > _LARGEST_FILE:
+        raise ConfigError(f"{path}: is larger than 1 MiB, so it is no configuration")
+    try:
+        text = raw.decode()
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise ConfigError(f"{path}: line {line}: not UTF-8 text, save the file as UTF-8") from None
+    return parse(text, str(path))
+
+
+def parse(text: str, name: str) -> LoadedConfig:
+    """Check the text of a configuration.
+
+    Args:
+        text: TOML.
+        name: what to call it in errors, usually its path.
+
+    Raises:
+        ConfigError: it cannot be used; carries every problem, one line each.
+    """
+    data = _toml(text, name)
+    problems = Problems(name)
+    config = problems.validated(Config, data)
+    driver, options = _driver(problems, data)
+    law, params = _law(problems, data)
+    if config is not None:
+        _check_together(problems, config)
+    if problems.lines or config is None or driver is None or options is None or law is None or params is None:
+        raise ConfigError(*problems.lines)
+    return LoadedConfig(config, driver, options, law, params, Path(name), text)
+
+
+def _toml(text: str, name: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text.removeprefix("\ufeff"))
+    except RecursionError:
+        raise ConfigError(f"{name}: arrays or tables are nested too deeply") from None
+    except ValueError as error:  # TOMLDecodeError, and what tomllib lets through, such as a number of 5000 digits
+        found = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", str(error), re.DOTALL)
+        if found is None:
+            raise ConfigError(f"{name}: not TOML: {error}") from None
+        reason, line, column = found.groups()
+        where = f"line {line}, column {column}" if line else "end of the file"
+        raise ConfigError(f"{name}: {where}: not TOML: {reason[:1].lower()}{reason[1:]}") from None
+
+
+def _driver(problems: Problems, data: dict[str, Any]) -> tuple[type[Driver[Any]] | None, DriverOptions | None]:
+    device = data.get("device", {})
+    default = DeviceConfig().driver
+    driver = _plugin(problems, device, ("device", "driver"), default, registry.DRIVERS, registry.driver)
+    if driver is None:
+        return None, None
+    options = device.get("options", {})
+    if not isinstance(options, dict):  # already reported
+        return driver, None
+    return driver, problems.validated(driver.Options, options, ("device", "options"))
+
+
+def _law(problems: Problems, data: dict[str, Any]) -> tuple[ModuleType | None, LawParams | None]:
+    controller = data.get("controller", {})
+    default = ControllerConfig().law
+    law = _plugin(problems, controller, ("controller", "law"), default, registry.CONTROLLERS, registry.law)
+    if law is None:
+        return None, None
+    params = controller.get("params", {})
+    if not isinstance(params, dict):  # already reported
+        return law, None
+    model: type[LawParams] = law.Params
+    return law, problems.validated(model, params, ("controller", "params"))
+
+
+def _plugin(
+    problems: Problems,
+    table: object,
+    key: tuple[str, str],
+    default: str,
+    group: str,
+    find: Callable[[str], PluginT],
+) -> PluginT | None:
+    """Look up the plug-in that a table names; None, with the reason reported, when that is impossible."""
+    name = table.get(key[1], default) if isinstance(table, dict) else None
+    if not isinstance(name, str) or not name:  # already reported
+        return None
+    installed = registry.names(group)
+    own_module = group == registry.CONTROLLERS and "." in name
+    if name not in installed and not own_module:
+        advice = nearest(name, installed).replace("known here:", "installed are")
+        own = ", or `package.module` of your own" if group == registry.CONTROLLERS else ""
+        problems.add(key, f"not installed; {advice}{own}", name)
+        return None
+    if own_module and not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)+", name):
+        problems.add(key, "must be the dotted name of a Python module, such as mylab.laws", name)
+        return None
+    try:
+        return find(name)
+    except PluginError as error:
+        missing = isinstance(error.__cause__, ModuleNotFoundError)
+        problems.add(key, f"{error}{_MAKE_IMPORTABLE if missing else ''}", name)
+        return None
+
+
+def _check_together(problems: Problems, config: Config) -> None:
+    """What two tables must agree on."""
+    highest_hz = config.loop.rate_hz / 2.0
+    if config.velocity.estimator == "lowpass" and config.velocity.cutoff_hz >= highest_hz:
+        problems.add(
+            ("velocity", "cutoff_hz"),
+            f"must be less than {highest_hz:g} Hz, half of loop.rate_hz",
+            config.velocity.cutoff_hz,
+        )

@@ -1,0 +1,121 @@
+"""What the supervisor may ask of the running loop, worked off in slices between ticks.
+
+A new law or scene is built a slice a tick, in the time left before the next deadline, and taken at a tick boundary.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Generator
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from hapticd import registry
+from hapticd.config.models import SafetyConfig, SceneConfig
+from hapticd.contracts.errors import HapticdError
+from hapticd.contracts.event import EventCode
+from hapticd.control.contact import RunningLaw
+from hapticd.guard import Guard
+
+if TYPE_CHECKING:
+    from hapticd.control.loop import ControlLoop
+
+_SWITCH_INTERVAL_S = 5e-5
+"""How soon an import that runs beside the loop gives the interpreter back to it [s]."""
+
+
+class Letters:
+    """Answers the supervisor's requests.
+
+    Args:
+        loop: the loop that they are for.
+    """
+
+    def __init__(self, loop: ControlLoop) -> None:
+        self._loop = loop
+        self._work: Generator[None, None, None] | None = None
+        self._laws: dict[str, ModuleType] = {}
+
+    def know(self, name: str, law: ModuleType) -> None:
+        """Remember an imported law, so that a switch to it imports nothing."""
+        self._laws[name] = law
+
+    def work(self) -> None:
+        """Do the next slice of the letter that waits; answer it when it is done."""
+        shared = self._loop.shared
+        try:
+            if self._work is None:
+                letter = shared.letter()
+                self._work = getattr(self, f"_do_{letter.pop('do')}")(**letter)
+            next(self._work)
+        except StopIteration:
+            self._work = None
+            shared.answer("")
+        except Exception as error:  # noqa: BLE001 - the loop goes on whatever the supervisor asks for
+            self._work = None
+            text = str(error) if isinstance(error, HapticdError) else f"{type(error).__name__}: {error}"
+            shared.answer(text or type(error).__name__)
+
+    def _do_arm(self) -> Generator[None, None, None]:
+        if not self._loop.arm():
+            raise HapticdError("stopped by a fault: `hapticd clear` first")
+        yield
+
+    def _do_disarm(self) -> Generator[None, None, None]:
+        self._loop.tick.release()
+        self._loop.event(EventCode.DISARMED, "disarmed: the force is ramped to zero")
+        yield
+
+    def _do_clear(self) -> Generator[None, None, None]:
+        self._loop.tick.guard.clear()
+        self._loop.event(EventCode.CLEARED, "fault cleared; the device stays disarmed")
+        yield
+
+    def _do_switch(
+        self, law: str, params: dict[str, Any], scene: dict[str, Any], safety: dict[str, Any], was: str, config: str
+    ) -> Generator[None, None, None]:
+        """Take another law, scene and limits; all or nothing."""
+        loop = self._loop
+        tick = loop.tick
+        if law not in self._laws:
+            yield from self._import(law)
+        module = self._laws[law]
+        yield
+        values = module.Params.model_validate(params)
+        new_scene = SceneConfig.model_validate(scene)
+        new_safety = SafetyConfig.model_validate(safety)
+        yield
+        RunningLaw(module, values)  # shows that it can be built, before anything has changed
+        yield
+        Guard(new_safety, tick.info)  # refuses limits that this device cannot have, before anything has changed
+        tick.switch_scene(new_scene)
+        tick.guard.configure(new_safety, tick.info)
+        tick.ramp_s = new_safety.ramp_s
+        if not tick.fallback:
+            tick.switch_law(lambda: RunningLaw(module, values))
+        else:
+            tick.make_law = lambda: RunningLaw(module, values)
+        loop.law_count += 1
+        loop.event(EventCode.SWITCHED, f"law {was} -> {law}", law_before=was, law=law, config=config)
+
+    def _import(self, name: str) -> Generator[None, None, None]:
+        """Import a law beside the loop; its ticks go on, at worst late by the switch interval."""
+        found: list[ModuleType | Exception] = []
+
+        def load() -> None:
+            try:
+                found.append(registry.law(name))
+            except HapticdError as error:
+                found.append(error)
+
+        before_s = sys.getswitchinterval()
+        sys.setswitchinterval(_SWITCH_INTERVAL_S)
+        threading.Thread(target=load, daemon=True).start()
+        while not found:
+            yield
+        sys.setswitchinterval(before_s)
+        result = found[0]
+        if isinstance(result, Exception):
+            raise result
+        self._laws[name] = result

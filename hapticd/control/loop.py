@@ -1,0 +1,253 @@
+"""The loop: sleep to the deadline, read, tick, write, record. Nothing else may wait, log or send here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from hapticd.config.models import LoopConfig, SafetyConfig
+from hapticd.contracts.driver import Driver, DriverState, Sample
+from hapticd.contracts.errors import DriverError
+from hapticd.contracts.event import Event, EventCode
+from hapticd.control.letters import Letters
+from hapticd.control.shared import (
+    CONTROL_BEAT,
+    DONE,
+    MAIL,
+    RECORDS,
+    SKIPPED,
+    SUPERVISOR_BEAT,
+    SharedMemory,
+)
+from hapticd.control.tick import ControlTick
+from hapticd.guard import Mode
+
+BUDGET_TICKS = 10
+BUDGET_MISSES = 3
+"""A law fails when this many of the last `BUDGET_TICKS` ticks computed for longer than the budget."""
+
+STOP_RAMP_S = 0.05
+"""Longest ramp to zero at a stop [s]: whoever killed the supervisor may not have the patience for more."""
+
+BURST_TICKS = 10
+"""Deadlines skipped in one go that are worth an event."""
+
+
+class ControlLoop:
+    """Owns the driver and runs the tick.
+
+    Args:
+        driver: an open driver.
+        tick: what happens between sample and force.
+        shared: the memory shared with the supervisor.
+        loop: the [loop] table.
+        safety: the [safety] table.
+        auto_arm: arm as soon as the loop runs.
+        sleep_until: sleeps to a CLOCK_MONOTONIC time [ns].
+
+    Attributes:
+        stop_requested: set by a signal or a letter; the force is ramped to zero and the loop ends.
+    """
+
+    def __init__(
+        self,
+        driver: Driver[Any],
+        tick: ControlTick,
+        shared: SharedMemory,
+        loop: LoopConfig,
+        safety: SafetyConfig,
+        auto_arm: bool,
+        sleep_until: Callable[[int], None],
+    ) -> None:
+        self.driver = driver
+        self.tick = tick
+        self.shared = shared
+        self.loop = loop
+        self.safety = safety
+        self.stop_requested = False
+        self.law_count = 0
+        self.seq = 0
+        self._deadline_ns = 0
+        self._sleep_until = sleep_until
+        self._auto_arm = auto_arm
+        self._area = shared.record_area
+        self.letters = Letters(self)
+        self._stopping = False
+        self._stalled = False
+
+    def event(self, code: EventCode, text: str, **fields: float | int | str) -> None:
+        """Tell the supervisor that something happened."""
+        self.shared.write_event(Event(code, text, self.seq, self._deadline_ns, fields))
+
+    def arm(self) -> bool:
+        """Enable the device and let forces through; False while latched.
+
+        Raises:
+            DriverError: the device refuses.
+        """
+        if self.tick.guard.latched:
+            return False
+        self.driver.enable()
+        self.tick.arm()
+        self.event(EventCode.ARMED, "armed: forces are let through")
+        return True
+
+    def run(self) -> None:
+        """Tick until a stop is requested; whatever happens, the device is left without force.
+
+        Raises:
+            DriverError: the device was lost.
+        """
+        try:
+            self._run()
+        except DriverError as error:
+            self.event(EventCode.DEVICE_LOST, f"device lost: {error}")
+            raise
+        finally:
+            self.driver.close()
+
+    def _run(self) -> None:
+        driver = self.driver
+        tick = self.tick
+        guard = tick.guard
+        shared = self.shared
+        words = shared.words
+        sleep_until = self._sleep_until
+        read = driver.read
+        write = driver.write
+        step = tick.step
+        monotonic_ns = time.monotonic_ns
+        thread_time_ns = time.thread_time_ns
+        period_ns = self.loop.period_ns
+        budget_ns = int(self.loop.law_budget * period_ns)
+        stall_ns = int(self.safety.supervisor_stall_s * 1e9)
+        all_ticks = (1 << BUDGET_TICKS) - 1
+        misses = 0
+        skipped = 0
+        busy_us = 0.0
+
+        tick.start(read())
+        self.event(EventCode.STARTED, f"the loop runs at {self.loop.rate_hz:g} Hz", rate_hz=self.loop.rate_hz)
+        if self._auto_arm:
+            self.arm()
+        # Deadlines are whole multiples of the period, so that an outside witness can share them.
+        deadline_ns = monotonic_ns() // period_ns * period_ns + 2 * period_ns
+        last_ns = deadline_ns - period_ns
+        cpu_ns = thread_time_ns()
+        while True:
+            sleep_until(deadline_ns)
+            woke_ns = monotonic_ns()
+            self._deadline_ns = deadline_ns
+
+            sample = read()
+            force_n = step(sample, (woke_ns - last_ns) * 1e-9)
+            if guard.mode is not Mode.DISARMED:
+                write(force_n)
+            last_ns = woke_ns
+
+            if tick.fault:
+                self._report_fault()
+            busy_us = (monotonic_ns() - woke_ns) * 1e-3
+            self._record(sample, deadline_ns, (woke_ns - deadline_ns) * 1e-3, busy_us, skipped)
+            words[CONTROL_BEAT] = woke_ns
+
+            if words[MAIL] != words[DONE]:
+                self.letters.work()
+            if self.stop_requested and not self._stopping:
+                self._stopping = True
+                tick.release(min(tick.ramp_s, STOP_RAMP_S))
+            if guard.mode is Mode.DISARMED:
+                if driver.state is DriverState.ENABLED:
+                    driver.disable()
+                if self._stopping:
+                    return
+            if words[SUPERVISOR_BEAT] + stall_ns < woke_ns:
+                if not self._stalled:
+                    self._stalled = True
+                    tick.fail(EventCode.SUPERVISOR_STALLED, f"no sign of the supervisor for {stall_ns * 1e-9:g} s")
+            elif self._stalled:
+                self._stalled = False
+
+            self.seq += 1
+            deadline_ns += period_ns
+            now_ns = monotonic_ns()
+            if deadline_ns < now_ns:
+                behind = (now_ns - deadline_ns) // period_ns + 1
+                skipped += behind
+                deadline_ns += behind * period_ns
+                words[SKIPPED] = skipped
+                if behind >= BURST_TICKS:
+                    self.event(EventCode.OVERRUN_BURST, f"{behind} deadlines were missed at once", skipped=behind)
+
+            used_ns = thread_time_ns()
+            misses = misses << 1 & all_ticks
+            if used_ns - cpu_ns > budget_ns:
+                misses |= 1
+                if misses.bit_count() >= BUDGET_MISSES:
+                    tick.fail_law(
+                        EventCode.LAW_OVER_BUDGET,
+                        f"the tick computed for more than {budget_ns * 1e-3:.0f} us in {BUDGET_MISSES} of "
+                        f"{BUDGET_TICKS} ticks",
+                    )
+                    self._report_fault()
+            cpu_ns = used_ns
+
+    def _record(self, sample: Sample, deadline_ns: int, late_us: float, busy_us: float, skipped: int) -> None:
+        tick = self.tick
+        energy_j = stored_j = dissipated_j = generated_j = 0.0
+        walls: list[float] = []
+        for contact in tick.contacts:
+            ledger = contact.ledger
+            law = contact.law
+            energy_j += ledger.energy_j
+            stored_j += ledger.stored_j
+            dissipated_j += ledger.dissipated_j
+            generated_j += ledger.generated_j
+            walls += (
+                contact.tick.in_contact,
+                law.state.damping_n_s_per_m if law.publishes_damping else 0.0,
+                law.state.felt_mass_kg if law.publishes_mass else 0.0,
+                ledger.cycle,
+                ledger.cycle_energy_j,
+                ledger.cycle_generated_j,
+                ledger.cycle_damping_n_s_per_m,
+                ledger.cycle_duration_s,
+            )
+        shared = self.shared
+        layout = shared.layout
+        words = shared.words
+        written = words[RECORDS]
+        count = len(tick.contacts)
+        layout.struct(count).pack_into(
+            self._area,
+            written % shared.slots * layout.size,
+            self.seq,
+            deadline_ns,
+            late_us,
+            busy_us,
+            tick.dt_s,
+            skipped,
+            tick.flags,
+            self.law_count,
+            sample.buttons,
+            sample.gripper_m,
+            energy_j,
+            stored_j,
+            dissipated_j,
+            generated_j,
+            count,
+            *tick.position_m,
+            *tick.velocity_m_per_s,
+            *tick.force_n,
+            *tick.requested_n,
+            *(sample.orientation if layout.orientation else ()),
+            *walls,
+        )
+        words[RECORDS] = written + 1
+
+    def _report_fault(self) -> None:
+        tick = self.tick
+        if tick.fault:
+            self.event(EventCode(tick.fault), tick.fault_text)
+            tick.fault = 0

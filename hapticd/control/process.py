@@ -1,0 +1,188 @@
+"""The control process: what runs behind `python -m hapticd.control.process`.
+
+The supervisor starts it with one end of a socket pair as its descriptor `--socket`, and sends the configuration
+text. It answers once, with what it found and the descriptor of the shared memory, or with why it cannot run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import os
+import signal
+import socket
+import sys
+import time
+from dataclasses import asdict
+from types import ModuleType
+from typing import Any
+
+import msgpack
+
+from hapticd import registry
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.config.models import MAX_WALLS
+from hapticd.contracts.driver import DeviceInfo, Sample
+from hapticd.contracts.errors import ConfigError, HapticdError, PluginError
+from hapticd.contracts.record import RecordLayout
+from hapticd.control.contact import RunningLaw
+from hapticd.control.loop import ControlLoop
+from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
+from hapticd.control.shared import SUPERVISOR_BEAT, SharedMemory
+from hapticd.control.tick import ControlTick
+from hapticd.guard import Guard
+
+WARM_UP_TICKS = 200
+
+
+def receive(channel: socket.socket, head: bytes = b"") -> dict[str, Any]:
+    """One length-prefixed msgpack map from a socket.
+
+    Args:
+        channel: the socket.
+        head: the length, where it has been read already.
+
+    Raises:
+        EOFError: the other side is gone.
+    """
+    length = int.from_bytes(head or _exactly(channel, 4), "little")
+    received: dict[str, Any] = msgpack.unpackb(_exactly(channel, length))
+    return received
+
+
+def packed(message: dict[str, Any]) -> bytes:
+    """A length-prefixed msgpack map."""
+    body: bytes = msgpack.packb(message)
+    return len(body).to_bytes(4, "little") + body
+
+
+def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
+    """The tick that a configuration asks for on a device.
+
+    Raises:
+        ConfigError: scene or limits do not fit the device.
+    """
+    settings = config.config
+    return ControlTick(
+        settings.scene,
+        settings.velocity,
+        Guard(settings.safety, info),
+        info,
+        lambda: RunningLaw(config.law, config.params),
+        settings.loop.period_s,
+        settings.safety.ramp_s,
+    )
+
+
+def place_device(config: LoadedConfig, driver: Any) -> None:
+    """Tell a simulated device where the first wall is."""
+    walls = config.config.scene.walls
+    if walls:
+        driver.place(walls[0].position_m, 1 if walls[0].free_side == "positive" else -1)
+
+
+def main() -> int:
+    """Run the control process; the exit code says how it went."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--socket", type=int, required=True)
+    parser.add_argument("--parent", type=int, required=True)
+    arguments = parser.parse_args()
+    # The terminal's interrupt goes to every process in the group; the supervisor alone decides what it means.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    channel = socket.socket(fileno=arguments.socket)
+    try:
+        return _serve(channel, arguments.parent)
+    except HapticdError as error:
+        channel.sendall(packed({"error": str(error), "exit_code": error.exit_code}))
+        return error.exit_code
+    except EOFError:
+        return 1
+
+
+def _serve(channel: socket.socket, parent_pid: int) -> int:
+    request = receive(channel)
+    config = parse(request["text"], request["name"])
+    settings = config.config
+    driver = config.driver(config.options, settings.loop.period_s)
+    place_device(config, driver)
+    info = driver.open()
+    try:
+        _check_watchdog(config, info)
+        layout = RecordLayout(len(info.axes), info.has_orientation, MAX_WALLS)
+        shared = SharedMemory(layout, settings.loop.rate_hz)
+        tick = make_tick(config, info)
+        control = ControlLoop(
+            driver,
+            tick,
+            shared,
+            settings.loop,
+            settings.safety,
+            info.simulated or settings.safety.auto_arm,
+            make_sleeper(),
+        )
+        for name, law in _installed_laws().items():
+            control.letters.know(name, law)
+        control.letters.know(settings.controller.law, config.law)
+        _warm_up(make_tick(config, info))
+
+        def stop(_signal: int, _frame: object) -> None:
+            control.stop_requested = True
+
+        signal.signal(signal.SIGTERM, stop)
+        die_with_parent(parent_pid)
+        warnings = become_realtime(settings.loop)
+        shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
+        hello = {"info": asdict(info), "warnings": warnings, "pid": os.getpid()}
+        socket.send_fds(channel, [packed(hello)], [shared.descriptor])
+    except BaseException:
+        driver.close()
+        raise
+    control.run()
+    return 0
+
+
+def _check_watchdog(config: LoadedConfig, info: DeviceInfo) -> None:
+    """Refuse a real device that would keep its force when this computer dies, unless the user has accepted that."""
+    if info.host_silence_ms is None and not info.simulated and not config.config.device.accept_no_watchdog:
+        raise ConfigError(
+            f"{config.path}: device.accept_no_watchdog = false: {info.model} keeps its last force when this computer "
+            "stops; read docs/safety.md, then set it to true"
+        )
+
+
+def _installed_laws() -> dict[str, ModuleType]:
+    """Every installed law that can be imported, so that a switch imports nothing."""
+    laws = {}
+    for name in registry.names(registry.CONTROLLERS):
+        try:
+            laws[name] = registry.law(name)
+        except PluginError:
+            continue  # it is refused by name when somebody asks for it
+    return laws
+
+
+def _warm_up(tick: ControlTick) -> None:
+    """Run a copy of the tick on a press and a release, so that first calls are behind us."""
+    sample = Sample(len(tick.info.axes))
+    tick.start(sample)
+    tick.arm()
+    for count in range(WARM_UP_TICKS):
+        depth_m = 1e-4 * (count % 20 - 10)
+        sample.time_ns = sample.sequence = count + 1
+        sample.position_m[:] = [depth_m] * len(tick.info.axes)
+        tick.step(sample, tick.period_s)
+    gc.collect()
+
+
+def _exactly(channel: socket.socket, length: int) -> bytes:
+    received = b""
+    while len(received) < length:
+        part = channel.recv(length - len(received))
+        if not part:
+            raise EOFError("the supervisor is gone")
+        received += part
+    return received
+
+
+if __name__ == "__main__":
+    sys.exit(main())

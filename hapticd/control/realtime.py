@@ -1,0 +1,104 @@
+"""Make this process a real-time one, and sleep to absolute deadlines.
+
+Order matters: everything is imported and built before memory is locked and the collector frozen, and the scheduling
+class changes last.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import os
+import signal
+import struct
+from collections.abc import Callable
+
+from hapticd.config.models import LoopConfig
+from hapticd.contracts.errors import RealtimeError
+
+_MCL_CURRENT_AND_FUTURE = 1 | 2
+_CLOCK_MONOTONIC = 1
+_TIMER_ABSTIME = 1
+_PR_SET_PDEATHSIG = 1
+_PR_SET_TIMERSLACK = 29
+
+_libc = ctypes.CDLL(None, use_errno=True)
+_latency_hold: int | None = None
+
+
+def die_with_parent(parent_pid: int) -> None:
+    """Get SIGTERM when the parent dies; also when it has died already."""
+    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    if os.getppid() != parent_pid:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def become_realtime(config: LoopConfig) -> list[str]:
+    """Lock memory, freeze the collector, hold the processor out of deep idle, and take SCHED_FIFO.
+
+    Returns:
+        What could not be had, each with the grant that mends it; empty when all is well or nothing was asked for.
+
+    Raises:
+        RealtimeError: `required`, and scheduling or locked memory could not be had.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    if config.realtime == "off":
+        return ["realtime = off: the loop runs at normal priority"]
+    problems = []
+    if _libc.mlockall(_MCL_CURRENT_AND_FUTURE):
+        problems.append(
+            f"memory is not locked ({os.strerror(ctypes.get_errno())}): grant CAP_IPC_LOCK or a memlock limit of unlimited"
+        )
+    advice = _hold_latency()
+    try:
+        cpu = max(os.sched_getaffinity(0)) if config.cpu is None else config.cpu
+        os.sched_setaffinity(0, {cpu})
+    except OSError as error:
+        advice.append(f"loop.cpu = {config.cpu}: {error.strerror}; the loop may move between processors")
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(config.priority))
+    except OSError as error:
+        problems.append(
+            f"no SCHED_FIFO {config.priority} ({error.strerror}): grant CAP_SYS_NICE or an rtprio limit of "
+            f"{config.priority}"
+        )
+        _libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # else every sleep ends 50 us late
+    if problems and config.realtime == "required":
+        raise RealtimeError('loop.realtime = "required", but ' + "; ".join(problems))
+    return problems + advice
+
+
+def make_sleeper() -> Callable[[int], None]:
+    """A function that sleeps until a CLOCK_MONOTONIC time in nanoseconds; signals do not cut it short."""
+    nanosleep = _libc.clock_nanosleep
+    nanosleep.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+    timespec = (ctypes.c_int64 * 2)()
+    address = ctypes.addressof(timespec)
+
+    def sleep_until(deadline_ns: int) -> None:
+        timespec[0], timespec[1] = divmod(deadline_ns, 1_000_000_000)
+        while nanosleep(_CLOCK_MONOTONIC, _TIMER_ABSTIME, address, None):
+            pass
+
+    # The array must outlive the address.
+    sleep_until.timespec = timespec  # type: ignore[attr-defined]
+    return sleep_until
+
+
+def _hold_latency() -> list[str]:
+    """Ask the kernel not to let the processor sleep deeply, for as long as this process lives."""
+    global _latency_hold
+    if _latency_hold is not None:
+        return []
+    try:
+        _latency_hold = os.open("/dev/cpu_dma_latency", os.O_RDWR | os.O_CLOEXEC)
+        os.write(_latency_hold, struct.pack("i", 0))
+    except OSError as error:
+        with contextlib.suppress(OSError, TypeError):
+            os.close(_latency_hold)  # type: ignore[arg-type]
+        return [f"/dev/cpu_dma_latency: {error.strerror}; deep idle makes the loop later"]
+    return []

@@ -1,0 +1,88 @@
+"""A simulated one-axis device that advances by exactly one period at a time."""
+
+from __future__ import annotations
+
+import math
+
+from hapticd.simulation.options import SimulationOptions
+from hapticd.simulation.plant import (
+    Buffers,
+    PlantParams,
+    PlantState,
+    delay_line,
+    epochs,
+    move,
+    recorded_points,
+    sense,
+    start_state,
+    terms,
+)
+from hapticd.simulation.specialise import specialise
+
+
+class SimulatedDevice:
+    """The device model behind the loopback driver and the studies.
+
+    Coordinates: x relative to the first wall, outward positive; force on the device along the same direction.
+
+    Args:
+        options: the model.
+        period_s: time between samples [s].
+
+    Attributes:
+        ticks: periods done.
+
+    Raises:
+        ValueError: the model cannot be stepped at this rate.
+    """
+
+    def __init__(self, options: SimulationOptions, period_s: float) -> None:
+        self.options = options
+        self.period_s = period_s
+        self.ticks = 0
+        switches = terms(options)
+        self._move = specialise(move, switches)
+        self._sense = specialise(sense, switches)
+        self._buffers = Buffers(delay_line(options), *recorded_points(options))
+        self._state = PlantState()
+        for name, value in start_state(options).items():
+            setattr(self._state, name, value)
+        self._coming: list[tuple[float, PlantParams]] = []
+        for tick, fields in epochs(options, period_s):
+            params = PlantParams()
+            for name, value in fields.items():
+                setattr(params, name, value)
+            self._coming.append((tick, params))
+        self._coming.reverse()
+        self._params = self._coming.pop()[1]
+        self._next_change = self._coming[-1][0] if self._coming else math.inf
+        self._sense(self._state, self._params)
+
+    def advance(self, force_n: float) -> None:
+        """One period with this command held, then a new sample of the position."""
+        if self.ticks >= self._next_change:
+            self._params = self._coming.pop()[1]
+            self._next_change = self._coming[-1][0] if self._coming else math.inf
+        self._move(self._state, self._params, self._buffers, force_n)
+        self._sense(self._state, self._params)
+        self.ticks += 1
+
+    @property
+    def x_m(self) -> float:
+        """True position [m]."""
+        return self._state.x_m
+
+    @property
+    def v_m_per_s(self) -> float:
+        """True velocity [m/s]."""
+        return self._state.v_m_per_s
+
+    @property
+    def measured_m(self) -> float:
+        """Position as the sensor shows it [m]."""
+        return self._state.measured_m
+
+    @property
+    def applied_n(self) -> float:
+        """Force of the actuator over the last period, after delay, saturation and lag [N]."""
+        return self._state.applied_n

@@ -1,0 +1,221 @@
+"""[device.options] of a simulated device: what it weighs, where it rubs, how it senses, who holds it."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from hapticd.contracts.driver import DriverOptions
+from hapticd.simulation.presets import PRESETS
+
+MAX_DELAY_SAMPLES = 64
+_FORCE = 1e6  # [N], far beyond any hand: a bound only against slips of the pen
+
+Newton = Annotated[float, Field(ge=-_FORCE, le=_FORCE)]
+Seconds = Annotated[float, Field(ge=0.0, le=1e9)]
+
+
+class ConstantForce(DriverOptions):
+    """The same force all the time."""
+
+    profile: Literal["constant"] = "constant"
+    newton: Newton = Field(0.0, description="force along the outward normal, negative presses [N]")
+
+
+class StepForce(DriverOptions):
+    """One force before, another from a time on."""
+
+    profile: Literal["step"] = "step"
+    newton: Newton = Field(description="force from at_s on [N]")
+    from_newton: Newton = Field(0.0, description="force before [N]")
+    at_s: Seconds = Field(0.0, description="time of the step [s]")
+
+
+class RampForce(DriverOptions):
+    """A straight line from one force to another."""
+
+    profile: Literal["ramp"] = "ramp"
+    newton: Newton = Field(description="force at the end and after [N]")
+    from_newton: Newton = Field(0.0, description="force at the start and before [N]")
+    at_s: Seconds = Field(0.0, description="when the ramp starts [s]")
+    duration_s: float = Field(gt=0.0, le=1e9, description="how long it takes [s]")
+
+
+class SineForce(DriverOptions):
+    """A sine about an offset."""
+
+    profile: Literal["sine"] = "sine"
+    newton: Newton = Field(description="amplitude [N]")
+    offset_newton: Newton = Field(0.0, description="mean [N]")
+    frequency_hz: float = Field(ge=0.0, le=1e6, description="frequency [Hz]")
+
+
+class ChirpForce(DriverOptions):
+    """A sine whose frequency rises or falls in a straight line, then stays."""
+
+    profile: Literal["chirp"] = "chirp"
+    newton: Newton = Field(description="amplitude [N]")
+    offset_newton: Newton = Field(0.0, description="mean [N]")
+    start_hz: float = Field(ge=0.0, le=1e6, description="frequency at the start [Hz]")
+    end_hz: float = Field(ge=0.0, le=1e6, description="frequency at the end and after [Hz]")
+    duration_s: float = Field(gt=0.0, le=1e9, description="how long the sweep takes [s]")
+
+
+class PressAndReleaseForce(DriverOptions):
+    """A hand that presses and lets go, smoothly, again and again; it starts released."""
+
+    profile: Literal["press-and-release"] = "press-and-release"
+    newton: Newton = Field(-3.0, description="force when pressed hardest [N]")
+    release_newton: Newton = Field(0.0, description="force when let go; positive draws back [N]")
+    period_s: float = Field(1.0, gt=0.0, le=1e9, description="time of one press and release [s]")
+
+
+class RecordedForce(DriverOptions):
+    """A recorded force: straight lines between points, the first before them and the last after."""
+
+    profile: Literal["recorded"] = "recorded"
+    points: tuple[tuple[Seconds, Newton], ...] = Field(
+        (), max_length=10_000_000, description="[time s, force N] pairs, in order of time"
+    )
+    file: str | None = Field(None, description="CSV file of such pairs, with or without a header line")
+    repeat: bool = Field(False, description="start again after the last point")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, keys: Any) -> Any:
+        if isinstance(keys, dict) and isinstance(keys.get("file"), str):
+            if keys.get("points"):
+                raise ValueError("give either points or file")
+            return {**keys, "points": _recorded_points(Path(keys["file"]))}
+        return keys
+
+    @model_validator(mode="after")
+    def _in_order(self) -> RecordedForce:
+        if not self.points:
+            raise ValueError("a recorded force needs points or a file")
+        times = [time for time, _ in self.points]
+        if any(later <= earlier for earlier, later in itertools.pairwise(times)):
+            raise ValueError("points must be in order of time, each later than the one before")
+        if self.repeat and times[-1] <= 0.0:
+            raise ValueError("repeat needs a last point later than 0 s")
+        return self
+
+
+HandForce = Annotated[
+    ConstantForce | StepForce | RampForce | SineForce | ChirpForce | PressAndReleaseForce | RecordedForce,
+    Field(discriminator="profile"),
+]
+
+
+class Hand(DriverOptions):
+    """[device.options.hand]: the hand that holds the device, linear, and the force that it means to give."""
+
+    force: HandForce = Field(
+        default_factory=ConstantForce, description="force along the outward normal, negative presses"
+    )
+    mass_kg: float = Field(0.0, ge=0.0, le=1e6, description="mass that moves with the device [kg]")
+    damping_n_s_per_m: float = Field(0.0, ge=0.0, le=1e6, description="damping towards the world [N s/m]")
+    stiffness_n_per_m: float = Field(0.0, ge=0.0, le=1e9, description="spring that rests at x = 0 [N/m]")
+
+
+class Change(DriverOptions):
+    """One entry of changes: new values from some time on."""
+
+    at_s: Seconds = Field(description="device time of the first period with the new values [s]")
+    mass_kg: float | None = Field(None, gt=1e-9, le=1e6, description="new mass [kg]")
+    viscous_n_s_per_m: float | None = Field(None, ge=-1e6, le=1e9, description="new viscous friction [N s/m]")
+    coulomb_n: float | None = Field(None, ge=0.0, le=_FORCE, description="new Coulomb friction [N]")
+    max_force_n: float | None = Field(None, ge=0.0, le=_FORCE, description="new saturation, 0 = none [N]")
+    hand_mass_kg: float | None = Field(None, ge=0.0, le=1e6, description="new mass of the hand [kg]")
+    hand_damping_n_s_per_m: float | None = Field(None, ge=0.0, le=1e6, description="new damping of the hand [N s/m]")
+    hand_stiffness_n_per_m: float | None = Field(None, ge=0.0, le=1e9, description="new spring of the hand [N/m]")
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> Change:
+        if not self.values():
+            raise ValueError("name at least one new value")
+        return self
+
+    def values(self) -> dict[str, float]:
+        """The new values by name, without those that stay."""
+        return {
+            name: value
+            for name in type(self).model_fields
+            if name != "at_s" and (value := getattr(self, name)) is not None
+        }
+
+
+class SimulationOptions(DriverOptions):
+    """[device.options] of a simulated device. `model` fills the keys that the file does not set."""
+
+    model: Literal["omega7", "paper-simulation", "hapkit", "falcon"] = Field(
+        "omega7",
+        description="preset for mass, friction, resolution and force; a model, not a fact about hardware",
+    )
+    mass_kg: float = Field(0.25, gt=1e-9, le=1e6, description="mass that moves [kg]")
+    viscous_n_s_per_m: float = Field(
+        4.4, ge=-1e6, le=1e9, description="viscous friction; negative makes the device active [N s/m]"
+    )
+    coulomb_n: float = Field(0.0, ge=0.0, le=_FORCE, description="Coulomb friction, the same at rest and sliding [N]")
+    resolution_m: float = Field(1e-5, ge=0.0, le=1.0, description="step of the measured position, 0 = continuous [m]")
+    noise_m: float = Field(
+        0.0, ge=0.0, le=1.0, description="standard deviation of sensor noise; never beyond 3.5 of it [m]"
+    )
+    seed: int = Field(1, ge=0, le=2**53, description="seed of the noise; the same seed gives the same noise anywhere")
+    max_force_n: float = Field(
+        12.0, ge=0.0, le=_FORCE, description="force at which the actuator saturates, 0 = never [N]"
+    )
+    bandwidth_hz: float = Field(
+        0.0, ge=0.0, le=1e9, description="corner of the first-order actuator, 0 = immediate [Hz]"
+    )
+    force_delay_samples: int = Field(
+        0, ge=0, le=MAX_DELAY_SAMPLES, description="periods between a write and its force on the device"
+    )
+    initial_position_m: float = Field(0.0, ge=-1e3, le=1e3, description="start relative to the wall, > 0 outside [m]")
+    initial_velocity_m_per_s: float = Field(
+        0.0, ge=-1e3, le=1e3, description="velocity at the start, > 0 outward [m/s]"
+    )
+    clock: Literal["ticks", "wall"] = Field(
+        "ticks",
+        description="ticks: one period per read, whatever the host does; wall: periods that really elapsed",
+    )
+    hand: Hand = Field(default_factory=Hand, description="who holds the device")
+    changes: tuple[Change, ...] = Field((), description="new values from some time on")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_from_preset(cls, keys: Any) -> Any:
+        if isinstance(keys, dict):
+            preset = keys.get("model", "omega7")
+            if isinstance(preset, str) and preset in PRESETS:
+                return {**PRESETS[preset], **keys}
+        return keys
+
+    @model_validator(mode="after")
+    def _changes_in_order(self) -> SimulationOptions:
+        times = [change.at_s for change in self.changes]
+        if any(later <= earlier for earlier, later in itertools.pairwise(times)):
+            raise ValueError("changes must be in order of at_s, each later than the one before")
+        return self
+
+
+def _recorded_points(file: Path) -> tuple[tuple[float, float], ...]:
+    try:
+        with file.open(newline="", encoding="utf-8") as lines:
+            rows = [row for row in csv.reader(lines) if row and not row[0].lstrip().startswith("#")]
+    except OSError as error:
+        raise ValueError(f"{file}: {error.strerror}") from error
+    points = []
+    for number, row in enumerate(rows):
+        try:
+            time_s, newton = (float(cell) for cell in row)
+        except ValueError:
+            if number == 0:
+                continue  # a header
+            raise ValueError(f"{file}: row {number + 1}: {','.join(row)!r} is not `time s, force N`") from None
+        points.append((time_s, newton))
+    return tuple(points)

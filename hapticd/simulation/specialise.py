@@ -1,0 +1,72 @@
+"""Make the shortest form of a function: branches on switches that are off are removed before it runs.
+
+A module names its switches in capitals, `if DELAY: ...` or `if DELAY and ...:`; what a device does not have then
+costs nothing, neither interpreted nor compiled, and the source stays one function.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from types import FunctionType
+from typing import Any, TypeVar, cast
+
+FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+
+
+def specialise(function: FunctionT, switches: Mapping[str, bool]) -> FunctionT:
+    """A copy of a function without the branches that its switches rule out.
+
+    Functions of the same module that it calls are specialised with it. The copy keeps name, file and line numbers,
+    so that a traceback points at the source.
+
+    Args:
+        function: a plain function whose source can be read.
+        switches: name to on or off, for names that stand alone or first in an `if`.
+    """
+    return cast("FunctionT", _specialise(function, tuple(sorted(switches.items()))))
+
+
+@lru_cache(maxsize=256)
+def _specialise(function: FunctionType, switches: tuple[tuple[str, bool], ...]) -> FunctionType:
+    lines, first = inspect.getsourcelines(function)
+    tree = ast.parse(textwrap.dedent("".join(lines)))
+    tree = ast.fix_missing_locations(_Pruner(dict(switches)).visit(tree))
+    ast.increment_lineno(tree, first - 1)
+    definition = tree.body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    definition.returns = None
+    for argument in definition.args.args:
+        argument.annotation = None
+    called = {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)}
+    names = dict(function.__globals__)
+    for name in called:
+        callee = names.get(name)
+        if isinstance(callee, FunctionType) and callee.__module__ == function.__module__ and callee is not function:
+            names[name] = _specialise(callee, switches)
+    exec(compile(tree, inspect.getfile(function), "exec"), names)
+    specialised = names[function.__name__]
+    assert isinstance(specialised, FunctionType)
+    return specialised
+
+
+class _Pruner(ast.NodeTransformer):
+    """Drops the branches of an `if` on a switch."""
+
+    def __init__(self, switches: dict[str, bool]) -> None:
+        self._switches = switches
+
+    def visit_If(self, node: ast.If) -> Any:
+        self.generic_visit(node)
+        first, *rest = node.test.values if isinstance(node.test, ast.BoolOp) else [node.test]
+        if not (isinstance(first, ast.Name) and first.id in self._switches):
+            return node
+        if not self._switches[first.id]:
+            return node.orelse or ast.Pass()
+        if not rest:
+            return node.body
+        node.test = rest[0] if len(rest) == 1 else ast.BoolOp(ast.And(), rest)
+        return node

@@ -1,0 +1,28 @@
+"""Tell systemd how the service is: one datagram a message, nothing where systemd does not listen."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+
+
+class Notifier:
+    """Sends to $NOTIFY_SOCKET.
+
+    Attributes:
+        watchdog_s: how often systemd wants to hear that all is well [s]; 0 when it does not.
+    """
+
+    def __init__(self) -> None:
+        address = os.environ.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + address[1:] if address.startswith("@") else address
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) if address else None
+        watched = os.environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+        self.watchdog_s = int(os.environ.get("WATCHDOG_USEC", "0")) * 1e-6 if watched else 0.0
+
+    def send(self, *lines: str) -> None:
+        """Send assignments such as READY=1."""
+        if self._socket is not None:
+            with contextlib.suppress(OSError):  # systemd being away is no reason to stop
+                self._socket.sendto("\n".join(lines).encode(), self._address)

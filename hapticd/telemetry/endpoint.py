@@ -1,0 +1,109 @@
+"""Where an instance's sockets lie: the daemon and everyone who talks to it ask here."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from hapticd.contracts.errors import ConfigError, InstanceError
+
+DEFAULT_INSTANCE = "default"
+TELEMETRY = "telemetry"
+"""Name of the telemetry socket in the runtime directory."""
+
+_SYSTEM = Path("/run/hapticd")
+_INSTANCE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
+
+
+def runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
+    """Directory in which a daemon of this user keeps the sockets and the lock of an instance.
+
+    $HAPTICD_RUNTIME_DIR/<instance>, else systemd's $RUNTIME_DIRECTORY, else /run/hapticd/<instance> for root
+    or when this user may write there, else $XDG_RUNTIME_DIR/hapticd/<instance>, else
+    /tmp/hapticd-<uid>/<instance>.
+
+    Raises:
+        ConfigError: the name is none that a directory could have.
+    """
+    given = _given(instance)
+    if given is not None:
+        return given
+    system = _SYSTEM / instance
+    if os.geteuid() == 0 or os.access(system, os.W_OK | os.X_OK):
+        return system
+    return _user(instance)
+
+
+def make_runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
+    """The same, made when it is not there; below /tmp it is closed to other users.
+
+    Raises:
+        ConfigError: the name is none that a directory could have.
+        InstanceError: it cannot be made, or somebody else owns it.
+    """
+    directory = runtime_directory(instance)
+    shared = directory.is_relative_to(_temporary())
+    try:
+        directory.parent.mkdir(mode=0o700 if shared else 0o755, parents=True, exist_ok=True)
+        directory.mkdir(mode=0o700 if shared else 0o755, exist_ok=True)
+    except OSError as error:
+        raise InstanceError(
+            f"{directory}: cannot be made ({error.strerror}); set HAPTICD_RUNTIME_DIR to a directory of yours"
+        ) from error
+    if shared and not _ours(_temporary()):
+        raise InstanceError(
+            f"{_temporary()}: belongs to somebody else; set HAPTICD_RUNTIME_DIR to a directory of yours"
+        )
+    return directory
+
+
+def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
+    """Where a client finds a socket of an instance: the system's daemon first, then the user's own.
+
+    When no daemon has made one yet: where this user's own daemon would make it.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
+    given = _given(instance)
+    if given is not None:
+        return given / name
+    for directory in (_SYSTEM / instance, _user(instance)):
+        if (directory / name).exists():
+            return directory / name
+    return runtime_directory(instance) / name
+
+
+def telemetry_endpoint(instance: str = DEFAULT_INSTANCE) -> str:
+    """ZeroMQ endpoint on which an instance publishes to this computer."""
+    return f"ipc://{locate(TELEMETRY, instance)}"
+
+
+def _given(instance: str) -> Path | None:
+    """The directory that the environment names, if it does."""
+    if _INSTANCE.fullmatch(instance) is None:
+        raise ConfigError(f"instance = {instance!r}: letters, digits and _ . - only, at most 32, the first no sign")
+    base = os.environ.get("HAPTICD_RUNTIME_DIR")
+    if base:
+        return Path(base) / instance
+    unit = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    if unit:
+        return Path(unit) if Path(unit).name == instance else Path(unit) / instance
+    return None
+
+
+def _user(instance: str) -> Path:
+    session = os.environ.get("XDG_RUNTIME_DIR")
+    if session:
+        return Path(session) / "hapticd" / instance
+    return _temporary() / instance
+
+
+def _temporary() -> Path:
+    return Path("/tmp") / f"hapticd-{os.geteuid()}"
+
+
+def _ours(directory: Path) -> bool:
+    status = directory.lstat()
+    return directory.is_dir() and not directory.is_symlink() and status.st_uid == os.geteuid()

@@ -1,0 +1,306 @@
+"""Publishes what happened, tick by tick, over ZeroMQ; never waits for a subscriber.
+
+One XPUB socket, its sends non-blocking: who falls behind by `send_high_water` messages loses the next and
+sees it by `seq`; nobody else notices.
+"""
+
+from __future__ import annotations
+
+import errno
+import ipaddress
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from hapticd.config.models import TelemetryConfig
+from hapticd.contracts.errors import InstanceError
+from hapticd.contracts.event import Event
+from hapticd.contracts.record import TickRecord
+from hapticd.telemetry import wire
+from hapticd.telemetry.wire import INVALID, Inputs, Map, Topic, timestamp_s
+
+BATCH_NS = 20_000_000
+"""Longest time that a tick waits in a batch [ns]."""
+
+_MOST_SUBSCRIPTIONS_AT_ONCE = 1000
+_LAST_WORDS_MS = 100
+_LARGEST_REQUEST = 1024  # bytes of a subscription; a subscriber has nothing longer to say
+
+
+@dataclass(slots=True)
+class PublisherCounts:
+    """What a publisher did so far.
+
+    Attributes:
+        ticks: ticks published, after decimation.
+        cycles: cycles published.
+        events: events published.
+        messages: messages sent, whoever received them.
+        payload_bytes: bytes of payload in them.
+        refused: messages that ZeroMQ did not take, 0 unless something is wrong.
+        invalid: maps in which a number was not finite.
+        subscriptions: requests for a topic seen.
+    """
+
+    ticks: int = 0
+    cycles: int = 0
+    events: int = 0
+    messages: int = 0
+    payload_bytes: int = 0
+    refused: int = 0
+    invalid: int = 0
+    subscriptions: int = 0
+
+
+class Publisher:
+    """The telemetry of one instance.
+
+    Not guarded against a second daemon on the same ipc path, which would silently take it over: hold the
+    instance's lock first. Not for use from two threads.
+
+    Args:
+        config: the [telemetry] table.
+        ipc_path: where to publish to this computer, None for nowhere; `config.ipc` = false is obeyed as well.
+        info: what the device reports besides its position.
+        epoch_offset_ns: `wire.measure_epoch_offset_ns`, measured once at start.
+        input_every_tick: publish `hapticd/input` at every tick and not on change only.
+
+    Raises:
+        InstanceError: an endpoint cannot be had; the message says which, why and what to do.
+    """
+
+    def __init__(
+        self,
+        config: TelemetryConfig,
+        ipc_path: Path | None,
+        info: Inputs,
+        epoch_offset_ns: int,
+        *,
+        input_every_tick: bool = False,
+    ) -> None:
+        self.counts = PublisherCounts()
+        self.endpoints: list[str] = []
+        self._offset_ns = epoch_offset_ns
+        self._inputs = info
+        self._has_input = bool(info.buttons or info.has_gripper or info.has_orientation)
+        self._input_every_tick = input_every_tick
+        self._last_input: tuple[object, ...] = ()
+        self._input_message: list[Map] | None = None
+        self._status: dict[str, Any] | None = None
+        self._seq = -1
+        self._cycles = wire.Cycles()
+        self._packer = wire.new_packer()
+        self._position: list[Map] = []
+        self._energy: list[Map] = []
+        self._damping: list[Map] = []
+        self._timing: list[Map] = []
+        self._input: list[Map] = []
+        self._batch_due_ns: int | None = None
+        self.reconfigure(config)
+
+        self._ipc_path: Path | None = None
+        self._context = zmq.Context(io_threads=1)
+        self._socket = self._context.socket(zmq.XPUB)
+        try:
+            self._socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+            self._socket.setsockopt(zmq.SNDHWM, config.send_high_water)
+            self._socket.setsockopt(zmq.LINGER, 0)
+            self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
+            if config.tcp is not None:
+                self._bind_tcp(config.tcp)
+            if config.ipc and ipc_path is not None:
+                self._bind_ipc(ipc_path)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def subscription_fd(self) -> int:
+        """Becomes readable when `service` may have something to do; edge-triggered, as ZeroMQ has it."""
+        return int(self._socket.getsockopt(zmq.FD))
+
+    @property
+    def flush_due_ns(self) -> int | None:
+        """When `flush` has something to send [ns of CLOCK_MONOTONIC]; None while no tick waits."""
+        return self._batch_due_ns
+
+    def reconfigure(self, config: TelemetryConfig) -> None:
+        """Take over batching and decimation from a reloaded file; endpoints stay as they were bound."""
+        self._batch_ticks = config.batch_ticks
+        self._every_ticks = config.every_ticks
+
+    def publish(self, records: Sequence[TickRecord]) -> None:
+        """Publish ticks, oldest first. Full batches leave now, the rest with `flush`; cycles leave now."""
+        cycles: list[Map] = []
+        for record in records:
+            timestamp = timestamp_s(record.deadline_ns, self._offset_ns)
+            self._seq = record.seq
+            for wall, _ in self._cycles.completed(record):
+                cycles.append(wire.cycle_map(record, timestamp, wall))
+            if self._has_input:
+                self._add_input(record, timestamp)
+            if record.seq % self._every_ticks == 0:
+                self._add_tick(record, timestamp)
+        if cycles:
+            self.counts.cycles += len(cycles)
+            self._send(Topic.CYCLE, cycles)
+        self.service()
+
+    def event(self, event: Event) -> None:
+        """Publish an event at once."""
+        self.counts.events += 1
+        self._send(Topic.EVENT, [wire.event_map(event, timestamp_s(event.deadline_ns, self._offset_ns))])
+
+    def status(self, status: Mapping[str, Any]) -> None:
+        """Publish the state of the daemon, and keep it for whoever subscribes later."""
+        self._status = dict(status)
+        self._send_status()
+
+    def flush(self, now_ns: int) -> None:
+        """Send the ticks that wait, when the oldest has waited 20 ms.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC [ns].
+        """
+        if self._batch_due_ns is not None and now_ns >= self._batch_due_ns:
+            self._send_batch()
+        self.service()
+
+    def service(self) -> None:
+        """Answer new subscribers: the state of the daemon and of its buttons, at once. Returns at once."""
+        wanted: set[Topic] = set()
+        for _ in range(_MOST_SUBSCRIPTIONS_AT_ONCE):
+            # `recv` would raise when there is nothing; this costs a tenth of it.
+            if not int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
+                break
+            try:
+                request = self._socket.recv(zmq.NOBLOCK)
+            except zmq.Again:
+                break
+            if request[:1] == b"\x01":
+                self.counts.subscriptions += 1
+                prefix = request[1:]
+                wanted.update(topic for topic in (Topic.STATUS, Topic.INPUT) if topic.encode().startswith(prefix))
+        if Topic.STATUS in wanted and self._status is not None:
+            self._send_status()
+        if Topic.INPUT in wanted and self._input_message is not None:
+            self._send(Topic.INPUT, self._input_message)
+
+    def close(self) -> None:
+        """Send what waits, let go of the endpoints, remove the ipc file. May be called twice.
+
+        The last messages have 0.1 s to leave; only a stalled subscriber makes it that long.
+        """
+        if not self._socket.closed:
+            self._send_batch()
+        self._socket.close(linger=_LAST_WORDS_MS)
+        self._context.term()  # returns when ZeroMQ's thread has let go of the path
+        if self._ipc_path is not None:
+            self._ipc_path.unlink(missing_ok=True)
+            self._ipc_path = None
+
+    def _add_tick(self, record: TickRecord, timestamp: float) -> None:
+        if self._batch_due_ns is None:
+            self._batch_due_ns = record.deadline_ns + BATCH_NS
+        elif record.deadline_ns >= self._batch_due_ns:
+            self._send_batch()
+            self._batch_due_ns = record.deadline_ns + BATCH_NS
+        self._position.append(wire.position_map(record, timestamp))
+        self._energy.append(wire.energy_map(record, timestamp))
+        self._damping.append(wire.damping_map(record, timestamp))
+        self._timing.append(wire.timing_map(record, timestamp))
+        self.counts.ticks += 1
+        if len(self._position) >= self._batch_ticks:
+            self._send_batch()
+
+    def _add_input(self, record: TickRecord, timestamp: float) -> None:
+        state = (record.buttons, record.gripper_m, record.orientation)
+        if state == self._last_input and not self._input_every_tick:
+            return
+        self._last_input = state
+        fields = wire.input_map(record, timestamp, self._inputs)
+        self._input_message = [fields]
+        self._input.append(fields)
+        if self._batch_due_ns is None:
+            self._batch_due_ns = record.deadline_ns + BATCH_NS
+
+    def _send_batch(self) -> None:
+        self._batch_due_ns = None
+        for topic, maps in (
+            (Topic.POSITION, self._position),
+            (Topic.ENERGY, self._energy),
+            (Topic.DAMPING, self._damping),
+            (Topic.TIMING, self._timing),
+            (Topic.INPUT, self._input),
+        ):
+            if maps:
+                self._send(topic, maps)
+                maps.clear()
+
+    def _send_status(self) -> None:
+        assert self._status is not None
+        now = timestamp_s(time.monotonic_ns(), self._offset_ns)
+        self._send(Topic.STATUS, [wire.status_map(self._status, now, self._seq, self._every_ticks)])
+
+    def _send(self, topic: Topic, maps: list[Map]) -> None:
+        self.counts.invalid += sum(INVALID in fields for fields in maps)
+        payload: bytes = self._packer.pack(maps)
+        try:
+            self._socket.send_multipart((topic.encode(), payload), zmq.NOBLOCK)
+        except zmq.ZMQError:  # an XPUB drops rather than refuses; if it ever refuses, the loop must not suffer
+            self.counts.refused += 1
+            return
+        self.counts.messages += 1
+        self.counts.payload_bytes += len(payload)
+
+    def _bind_tcp(self, endpoint: str) -> None:
+        host, _, port = endpoint.removeprefix("tcp://").rpartition(":")
+        host = host.strip("[]")
+        try:
+            address = ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
+        except ValueError:
+            address = None
+        if address is None or not address.is_loopback:
+            raise InstanceError(
+                f"{endpoint}: off-host only with CURVE keys, which this version does not have; "
+                "set telemetry.tcp to a loopback address such as tcp://127.0.0.1:9872"
+            )
+        if address.version == 6:
+            self._socket.setsockopt(zmq.IPV6, 1)
+            self._bind(f"tcp://[{address}]:{port}")
+        else:
+            self._bind(f"tcp://{address}:{port}")
+
+    def _bind_ipc(self, path: Path) -> None:
+        if path.exists() and not path.is_socket():
+            raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
+        self._bind(f"ipc://{path}")
+        self._ipc_path = path
+
+    def _bind(self, endpoint: str) -> None:
+        try:
+            self._socket.bind(endpoint)
+        except zmq.ZMQError as error:
+            raise InstanceError(f"{endpoint}: {_advice(error.errno or 0)}") from error
+        self.endpoints.append(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
+
+
+def _advice(number: int) -> str:
+    """What went wrong with an endpoint and what to do about it, in one line."""
+    match number:
+        case errno.EADDRINUSE:
+            return "another program listens there; stop it, or set another telemetry.tcp"
+        case errno.EACCES | errno.EPERM | errno.EROFS:
+            return "no permission; run as the user that owns the directory, or set HAPTICD_RUNTIME_DIR"
+        case errno.ENOENT | errno.ENOTDIR:
+            return "its directory is not there; make it, or set HAPTICD_RUNTIME_DIR"
+        case errno.ENAMETOOLONG:
+            return "path longer than 107 bytes; set HAPTICD_RUNTIME_DIR to a shorter one"
+        case errno.EADDRNOTAVAIL | errno.ENODEV | errno.EINVAL:
+            return "no such address or port on this computer; set another telemetry.tcp"
+        case _:
+            return f"{zmq.strerror(number)}; set another endpoint in [telemetry]"

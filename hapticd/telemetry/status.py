@@ -1,0 +1,119 @@
+"""What `hapticd/status` says: the supervisor fills it in, clients get it back, `hapticd watch` shows it."""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from hapticd.telemetry.wire import SCHEMA, Topic
+
+LATE_EDGES_US = (10, 20, 40, 80, 160, 320, 640, 1280, 2560, 5120, 10240)
+"""Edges of the histogram of late ticks [us].
+
+Bin 0 counts ticks less than 10 us late, bin i those from edge i-1 to below edge i, the last one those of
+10.24 ms and more.
+"""
+
+
+class LateHistogram:
+    """Counts how late ticks were.
+
+    Attributes:
+        counts: one a bin, one more than there are edges.
+        max_us: the latest tick [us].
+    """
+
+    __slots__ = ("counts", "max_us")
+
+    def __init__(self) -> None:
+        self.counts = [0] * (len(LATE_EDGES_US) + 1)
+        self.max_us = 0.0
+
+    def add(self, late_us: float) -> None:
+        """Count one tick."""
+        self.counts[bisect.bisect_right(LATE_EDGES_US, late_us)] += 1
+        if late_us > self.max_us:
+            self.max_us = late_us
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Status:
+    """State of the daemon, once a second and at every change. Counts run since the daemon started.
+
+    Attributes:
+        timestamp: when it was said [s since the epoch]; the publisher fills it in.
+        seq: last tick published, -1 before the first; the publisher fills it in.
+        schema: version of the wire contract; the publisher fills it in.
+        every_ticks: one tick in so many is published; the publisher fills it in.
+        version: of hapticd.
+        instance: name of the daemon's instance.
+        rate_hz: ticks a second that the loop is set to [Hz].
+        measured_rate_hz: ticks a second that it ran lately [Hz]; 0 while unknown.
+        ticks: ticks that it ran.
+        overruns: deadlines that it skipped.
+        late_histogram: ticks by how late they were, bins of `LATE_EDGES_US`.
+        late_max_us: the latest of them [us].
+        busy_max_us: the longest tick body [us].
+        ring_drops: ticks that the supervisor was too slow to fetch.
+        armed: forces are let through.
+        fallback: the law failed, damping stands in for it.
+        releasing: the force is being ramped out.
+        latched: stopped by a fault until cleared.
+        law: name of the running law.
+        law_index: its activation, counted up at each switch.
+        driver: name of the driver.
+        device: what the device is.
+        serial: its serial number, "" without one.
+        simulated: no real device.
+        axes: names of its axes, in the order of positions and forces.
+        max_force_n: largest force that the guard lets through [N]; 0 when there is no limit.
+        wall_axis: axis of each wall, in scene order.
+        wall_position_m: where each wall is on its axis [m].
+        wall_stiffness_n_per_m: its stiffness now [N/m].
+        config_file: the file that is in force.
+        config_hash: of its content.
+        realtime: scheduling and memory are as the loop needs them.
+        warnings: what stands and should be known, a line each, for example "not real-time: ...".
+    """
+
+    topic: ClassVar[Topic] = Topic.STATUS
+
+    timestamp: float = 0.0
+    seq: int = -1
+    schema: int = SCHEMA
+    every_ticks: int = 1
+    version: str = ""
+    instance: str = ""
+    rate_hz: float = 0.0
+    measured_rate_hz: float = 0.0
+    ticks: int = 0
+    overruns: int = 0
+    late_histogram: tuple[int, ...] = ()
+    late_max_us: float = 0.0
+    busy_max_us: float = 0.0
+    ring_drops: int = 0
+    armed: bool = False
+    fallback: bool = False
+    releasing: bool = False
+    latched: bool = False
+    law: str = ""
+    law_index: int = 0
+    driver: str = ""
+    device: str = ""
+    serial: str = ""
+    simulated: bool = False
+    axes: tuple[str, ...] = ()
+    max_force_n: float = 0.0
+    wall_axis: tuple[str, ...] = ()
+    wall_position_m: tuple[float, ...] = ()
+    wall_stiffness_n_per_m: tuple[float, ...] = ()
+    config_file: str = ""
+    config_hash: str = ""
+    realtime: bool = False
+    warnings: tuple[str, ...] = ()
+
+    def as_map(self) -> dict[str, Any]:
+        """Keys and values, for `Publisher.status`."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}

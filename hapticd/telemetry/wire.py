@@ -1,0 +1,223 @@
+"""What goes over the wire: topics, and a tick record as the maps that docs/telemetry.md promises.
+
+Pure functions: no socket, no file. A number that is not finite never leaves: 0 is sent in its place and the
+map says `invalid`.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any, Protocol
+
+import msgpack
+
+from hapticd.contracts.event import Event
+from hapticd.contracts.record import TickRecord
+
+SCHEMA = 1
+"""Version of the contract; goes up only when a key changes its meaning or goes, which clients must notice."""
+
+INVALID = "invalid"
+"""Key that is true in a map in which a value was not finite, and absent otherwise."""
+
+Map = dict[str, Any]
+
+
+class Topic(enum.StrEnum):
+    """First frame of every message. None is a prefix of another, since ZeroMQ subscribes by prefix."""
+
+    POSITION = "hapticd/position"
+    ENERGY = "hapticd/energy"
+    DAMPING = "hapticd/damping"
+    TIMING = "hapticd/timing"
+    CYCLE = "hapticd/cycle"
+    INPUT = "hapticd/input"
+    EVENT = "hapticd/event"
+    STATUS = "hapticd/status"
+
+
+class Inputs(Protocol):
+    """The part of `DeviceInfo` that says what a device can report besides its position."""
+
+    @property
+    def buttons(self) -> int:
+        """Number of buttons."""
+
+    @property
+    def has_gripper(self) -> bool:
+        """Whether it has a gripper."""
+
+    @property
+    def has_orientation(self) -> bool:
+        """Whether it has a wrist."""
+
+
+def measure_epoch_offset_ns(tries: int = 16) -> int:
+    """What to add to CLOCK_MONOTONIC to get nanoseconds since the epoch: the narrowest of several readings.
+
+    Measured once, at start: a clock that is set later moves no timestamp backwards.
+    """
+    readings = []
+    for _ in range(tries):
+        before = time.monotonic_ns()
+        epoch = time.time_ns()
+        after = time.monotonic_ns()
+        readings.append((after - before, epoch - (before + after) // 2))
+    return min(readings)[1]
+
+
+def timestamp_s(deadline_ns: int, epoch_offset_ns: int) -> float:
+    """Seconds since the epoch at a time on CLOCK_MONOTONIC."""
+    return (deadline_ns + epoch_offset_ns) * 1e-9
+
+
+def position_map(record: TickRecord, timestamp: float) -> Map:
+    """hapticd/position: where the device is and what pushes it."""
+    fields: Map = {
+        "timestamp": timestamp,
+        "seq": record.seq,
+        "position_m": record.position_m,
+        "velocity_m_per_s": record.velocity_m_per_s,
+        "force_n": record.force_n,
+        "force_requested_n": record.force_requested_n,
+    }
+    # One sum tells whether all of its numbers are finite; one that merely overflowed is left to `plain_map`.
+    total = sum(record.position_m) + sum(record.velocity_m_per_s)
+    total += sum(record.force_n) + sum(record.force_requested_n)
+    return fields if math.isfinite(total) else plain_map(fields)
+
+
+def energy_map(record: TickRecord, timestamp: float) -> Map:
+    """hapticd/energy: the ledger."""
+    fields: Map = {
+        "timestamp": timestamp,
+        "seq": record.seq,
+        "energy_j": record.energy_j,
+        "spring_energy_j": record.spring_energy_j,
+        "dissipated_j": record.dissipated_j,
+        "generated_j": record.generated_j,
+    }
+    total = record.energy_j + record.spring_energy_j + record.dissipated_j + record.generated_j
+    return fields if math.isfinite(total) else plain_map(fields)
+
+
+def damping_map(record: TickRecord, timestamp: float) -> Map:
+    """hapticd/damping: what the law does at each wall."""
+    damping = [wall.damping_n_s_per_m for wall in record.walls]
+    mass = [wall.felt_mass_kg for wall in record.walls]
+    fields: Map = {
+        "timestamp": timestamp,
+        "seq": record.seq,
+        "damping_n_s_per_m": damping,
+        "in_contact": [wall.in_contact for wall in record.walls],
+        "felt_mass_kg": mass,
+    }
+    return fields if math.isfinite(sum(damping) + sum(mass)) else plain_map(fields)
+
+
+def timing_map(record: TickRecord, timestamp: float) -> Map:
+    """hapticd/timing: how punctual the tick was."""
+    fields: Map = {
+        "timestamp": timestamp,
+        "seq": record.seq,
+        "deadline_ns": record.deadline_ns,
+        "late_us": record.late_us,
+        "busy_us": record.busy_us,
+        "dt_s": record.dt_s,
+    }
+    return fields if math.isfinite(record.late_us + record.busy_us + record.dt_s) else plain_map(fields)
+
+
+def input_map(record: TickRecord, timestamp: float, inputs: Inputs) -> Map:
+    """hapticd/input: buttons, gripper and wrist, those that the device has."""
+    fields: Map = {"timestamp": timestamp, "seq": record.seq}
+    if inputs.buttons:
+        fields["buttons"] = record.buttons
+    if inputs.has_gripper:
+        fields["gripper_m"] = record.gripper_m
+    if inputs.has_orientation:
+        fields["orientation"] = record.orientation
+    return fields if math.isfinite(record.gripper_m + sum(record.orientation)) else plain_map(fields)
+
+
+class Cycles:
+    """Sees from one record to the next which walls completed a cycle."""
+
+    def __init__(self) -> None:
+        self._seen: list[int] = []
+
+    def completed(self, record: TickRecord) -> Iterator[tuple[int, int]]:
+        """Wall and number of each cycle that ended in this record; records must come in order."""
+        walls = record.walls
+        if len(walls) != len(self._seen):
+            self._seen = (self._seen + [0] * len(walls))[: len(walls)]
+        for index, wall in enumerate(walls):
+            cycle = wall.cycle
+            if cycle != self._seen[index]:
+                self._seen[index] = cycle
+                if cycle > 0:
+                    yield index, cycle
+
+
+def cycle_map(record: TickRecord, timestamp: float, wall: int) -> Map:
+    """hapticd/cycle: the cycle that a wall completed in this record."""
+    ended = record.walls[wall]
+    return plain_map(
+        {
+            "timestamp": timestamp,
+            "seq": record.seq,
+            "contact": wall,
+            "cycle": ended.cycle,
+            "energy_j": ended.cycle_energy_j,
+            "generated_j": ended.cycle_generated_j,
+            "damping_n_s_per_m": ended.cycle_damping_n_s_per_m,
+            "duration_s": ended.cycle_duration_s,
+        }
+    )
+
+
+def event_map(event: Event, timestamp: float) -> Map:
+    """hapticd/event: what happened; its fields stand beside the four keys that every event has."""
+    return plain_map({**event.fields, "timestamp": timestamp, "seq": event.seq, "code": event.code, "text": event.text})
+
+
+def status_map(status: Mapping[str, Any], timestamp: float, seq: int, every_ticks: int) -> Map:
+    """hapticd/status: what the supervisor says, and what only the publisher knows."""
+    wire = {"timestamp": timestamp, "seq": seq, "schema": SCHEMA, "every_ticks": every_ticks}
+    return plain_map({**status, **wire})
+
+
+def plain_map(fields: Mapping[str, Any]) -> Map:
+    """The same map in plain finite values; says `invalid` when one was not finite."""
+    invalid: list[str] = []
+    plain: Map = {str(key): _plain(value, str(key), invalid) for key, value in fields.items()}
+    if invalid:
+        plain[INVALID] = True
+    return plain
+
+
+def new_packer() -> msgpack.Packer:
+    """A packer to keep: making one costs more than packing a batch."""
+    return msgpack.Packer(use_bin_type=True, unicode_errors="replace")
+
+
+def _plain(value: Any, key: str, invalid: list[str]) -> Any:
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, int):
+        if -(2**63) <= value < 2**63:
+            return int(value)
+    elif isinstance(value, float):
+        if math.isfinite(value):
+            return float(value)
+    elif isinstance(value, Mapping):
+        return {str(name): _plain(element, key, invalid) for name, element in value.items()}
+    elif isinstance(value, list | tuple):
+        return [_plain(element, key, invalid) for element in value]
+    else:
+        return str(value)
+    invalid.append(key)
+    return 0

@@ -1,0 +1,205 @@
+"""What every driver must do, whatever the device: a test module subclasses `DriverContract` and names its driver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from hapticd.contracts.driver import Driver, DriverState
+from hapticd.contracts.errors import DriverStateError
+
+AnyDriver = Driver[Any]
+
+
+class DriverContract:
+    """Subclass as `TestYourDriver(DriverContract)` and provide the fixture `driver` and `force_on_device`."""
+
+    @pytest.fixture
+    def driver(self) -> AnyDriver:
+        """A closed driver whose device, or its double, is there."""
+        raise NotImplementedError
+
+    def force_on_device(self, driver: AnyDriver) -> Sequence[float]:
+        """What the device, and not the driver, says it is being pushed with now [N]; asked while the driver is open."""
+        raise NotImplementedError
+
+    @pytest.fixture
+    def enabled(self, driver: AnyDriver) -> AnyDriver:
+        driver.open()
+        driver.enable()
+        return driver
+
+    def a_force(self, driver: AnyDriver) -> list[float]:
+        limit = min(driver.info.max_force_n, 10.0)
+        return [limit / (2.0 * math.sqrt(len(driver.info.axes)))] * len(driver.info.axes)
+
+    def test_it_declares_a_device_that_makes_sense(self, driver: AnyDriver) -> None:
+        info = driver.open()
+        assert info is driver.info
+        assert info.model
+        assert len(info.axes) >= 1
+        assert len(set(info.axes)) == len(info.axes)
+        assert info.max_force_n > 0.0
+        assert math.isfinite(info.max_force_n) or info.simulated
+        assert 0.0 <= info.resolution_m < 0.01
+        assert len(info.workspace_m) == len(info.axes)
+        assert all(math.isfinite(low) and math.isfinite(high) and low < high for low, high in info.workspace_m)
+        assert info.nominal_rate_hz > 0.0
+        assert 0.0 < info.safe_damping_n_s_per_m < math.inf
+        assert info.host_silence_ms is None or info.host_silence_ms >= 0.0
+        driver.close()
+
+    def test_samples_are_finite_and_have_one_element_an_axis(self, enabled: AnyDriver) -> None:
+        info = enabled.info
+        for _ in range(20):
+            sample = enabled.read()
+            assert len(sample.position_m) == len(info.axes)
+            assert len(sample.velocity_m_per_s) == len(info.axes)
+            assert len(sample.orientation) == 9
+            numbers = [*sample.position_m, *sample.velocity_m_per_s, *sample.orientation, sample.gripper_m]
+            assert all(math.isfinite(number) for number in numbers)
+            assert 0 <= sample.buttons < 1 << max(info.buttons, 0) if info.buttons else sample.buttons == 0
+            enabled.write([0.0] * len(info.axes))
+        enabled.close()
+
+    def test_positions_stream_before_force_is_enabled(self, driver: AnyDriver) -> None:
+        driver.open()
+        assert all(math.isfinite(position) for position in driver.read().position_m)
+        driver.close()
+
+    def test_a_declared_clock_or_count_is_there_and_never_runs_back(self, enabled: AnyDriver) -> None:
+        seen = [(sample.time_ns, sample.sequence) for sample in (enabled.read() for _ in range(5))]
+        if enabled.info.has_clock:
+            assert all(time_ns >= 0 for time_ns, _ in seen)
+            assert sorted(time_ns for time_ns, _ in seen) == [time_ns for time_ns, _ in seen]
+        else:
+            assert all(time_ns == -1 for time_ns, _ in seen)
+        if enabled.info.has_sequence:
+            assert all(sequence >= 0 for _, sequence in seen)
+        else:
+            assert all(sequence == -1 for _, sequence in seen)
+        enabled.close()
+
+    def test_each_step_of_life_may_be_called_twice(self, driver: AnyDriver) -> None:
+        assert driver.open() is driver.open()
+        driver.enable()
+        driver.enable()
+        assert driver.state is DriverState.ENABLED
+        driver.disable()
+        driver.disable()
+        assert driver.state is DriverState.OPEN
+        driver.close()
+        driver.close()
+        assert driver.state is DriverState.CLOSED
+
+    def test_it_can_be_opened_again_after_it_was_closed(self, driver: AnyDriver) -> None:
+        for _ in range(2):
+            driver.open()
+            driver.enable()
+            driver.read()
+            driver.write(self.a_force(driver))
+            driver.close()
+        assert driver.state is DriverState.CLOSED
+
+    def test_a_closed_device_neither_reads_nor_writes_nor_says_what_it_is(self, driver: AnyDriver) -> None:
+        for _ in range(2):
+            with pytest.raises(DriverStateError):
+                driver.read()
+            with pytest.raises(DriverStateError):
+                driver.write([0.0])
+            with pytest.raises(DriverStateError):
+                driver.enable()
+            with pytest.raises(DriverStateError):
+                driver.calibrate()
+            with pytest.raises(DriverStateError):
+                _ = driver.info
+            driver.open()
+            driver.close()
+
+    def test_closing_or_disabling_what_was_never_opened_is_nothing(self, driver: AnyDriver) -> None:
+        driver.disable()
+        driver.close()
+        assert driver.state is DriverState.CLOSED
+
+    def test_an_open_device_takes_no_force_until_it_is_enabled(self, driver: AnyDriver) -> None:
+        driver.open()
+        driver.read()
+        with pytest.raises(DriverStateError):
+            driver.write(self.a_force(driver))
+        assert not any(self.force_on_device(driver))
+        driver.close()
+
+    def test_force_is_zero_from_enable_until_the_first_write(self, driver: AnyDriver) -> None:
+        driver.open()
+        driver.enable()
+        driver.read()
+        assert not any(self.force_on_device(driver))
+        driver.close()
+
+    def test_a_written_force_arrives(self, enabled: AnyDriver) -> None:
+        force = self.a_force(enabled)
+        for _ in range(3):
+            enabled.read()
+            enabled.write(force)
+        assert list(self.force_on_device(enabled)) == pytest.approx(force, rel=0.01)
+        enabled.close()
+
+    @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e200])
+    def test_a_force_that_is_no_force_is_refused_and_the_last_one_stays(self, enabled: AnyDriver, bad: float) -> None:
+        axes = len(enabled.info.axes)
+        force = self.a_force(enabled)
+        enabled.write(force)
+        for axis in range(axes):
+            with pytest.raises(DriverStateError):
+                enabled.write([bad if at == axis else 0.0 for at in range(axes)])
+        assert list(self.force_on_device(enabled)) == pytest.approx(force, rel=0.01)
+        enabled.close()
+
+    def test_a_force_beyond_the_limit_of_a_real_device_is_refused(self, enabled: AnyDriver) -> None:
+        info = enabled.info
+        over = [1.001 * info.max_force_n] + [0.0] * (len(info.axes) - 1)
+        if info.simulated:
+            if math.isfinite(info.max_force_n):
+                enabled.write(over)  # saturates by itself
+                assert abs(self.force_on_device(enabled)[0]) <= info.max_force_n
+        else:
+            with pytest.raises(DriverStateError):
+                enabled.write(over)
+            # All axes together: each within the limit, the magnitude beyond it.
+            if len(info.axes) > 1:
+                with pytest.raises(DriverStateError):
+                    enabled.write([0.99 * info.max_force_n] * len(info.axes))
+        enabled.close()
+
+    def test_a_force_for_another_number_of_axes_is_refused(self, enabled: AnyDriver) -> None:
+        axes = len(enabled.info.axes)
+        for wrong in ([], [0.0] * (axes + 1), [0.0] * (axes - 1)):
+            with pytest.raises(DriverStateError):
+                enabled.write(wrong)
+        enabled.close()
+
+    def test_disable_takes_the_force_away(self, enabled: AnyDriver) -> None:
+        enabled.read()
+        enabled.write(self.a_force(enabled))
+        enabled.disable()
+        assert not any(self.force_on_device(enabled))
+        with pytest.raises(DriverStateError):
+            enabled.write(self.a_force(enabled))
+        enabled.close()
+
+    def test_force_is_zero_again_after_disable_and_enable(self, enabled: AnyDriver) -> None:
+        enabled.write(self.a_force(enabled))
+        enabled.disable()
+        enabled.enable()
+        enabled.read()
+        assert not any(self.force_on_device(enabled))
+        enabled.close()
+
+    def test_calibration_is_refused_while_force_is_enabled(self, enabled: AnyDriver) -> None:
+        with pytest.raises(DriverStateError):
+            enabled.calibrate()
+        assert enabled.state is DriverState.ENABLED
+        enabled.close()
