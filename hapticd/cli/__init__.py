@@ -14,7 +14,7 @@ from hapticd import __version__
 from hapticd.contracts.errors import HapticdError
 
 COMMANDS: Final = {
-    "run": "Run the daemon in the foreground.",
+    "run": "Run the daemon in the foreground until it is interrupted.",
     "check": "Say whether configuration files can be used.",
     "config": "Describe the configuration file, or show one in full.",
     "devices": "List the installed device drivers and their options.",

@@ -17,8 +17,10 @@ from hapticd.config.problems import Problems, nearest
 from hapticd.contracts.driver import Driver, DriverOptions
 from hapticd.contracts.errors import ConfigError, PluginError
 from hapticd.contracts.law import LawParams
+from hapticd.contracts.table import Table
 
 PluginT = TypeVar("PluginT")
+TableT = TypeVar("TableT", bound=Table)
 
 _LARGEST_FILE = 1 << 20
 _MAKE_IMPORTABLE = (
@@ -112,7 +114,7 @@ def parse(text: str, name: str) -> LoadedConfig:
 
 def _toml(text: str, name: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text.removeprefix("\ufeff"))
+        return tomllib.loads(text.removeprefix("\ufeff") + "\n")
     except RecursionError:
         raise ConfigError(f"{name}: arrays or tables are nested too deeply") from None
     except ValueError as error:  # TOMLDecodeError, and what tomllib lets through, such as a number of 5000 digits
@@ -120,6 +122,7 @@ def _toml(text: str, name: str) -> dict[str, Any]:
         if found is None:
             raise ConfigError(f"{name}: not TOML: {error}") from None
         reason, line, column = found.groups()
+        reason = reason.replace("Cannot overwrite a value", "this key is set twice")
         where = f"line {line}, column {column}" if line else "end of the file"
         raise ConfigError(f"{name}: {where}: not TOML: {reason[:1].lower()}{reason[1:]}") from None
 
@@ -133,7 +136,7 @@ def _driver(problems: Problems, data: dict[str, Any]) -> tuple[type[Driver[Any]]
     options = device.get("options", {})
     if not isinstance(options, dict):  # already reported
         return driver, None
-    return driver, problems.validated(driver.Options, options, ("device", "options"))
+    return driver, _checked(problems, driver.Options, options, ("device", "options"))
 
 
 def _law(problems: Problems, data: dict[str, Any]) -> tuple[ModuleType | None, LawParams | None]:
@@ -146,7 +149,15 @@ def _law(problems: Problems, data: dict[str, Any]) -> tuple[ModuleType | None, L
     if not isinstance(params, dict):  # already reported
         return law, None
     model: type[LawParams] = law.Params
-    return law, problems.validated(model, params, ("controller", "params"))
+    return law, _checked(problems, model, params, ("controller", "params"))
+
+
+def _checked(problems: Problems, model: type[TableT], data: object, at: tuple[str, str]) -> TableT | None:
+    try:
+        return problems.validated(model, data, at)
+    except Exception as error:  # noqa: BLE001 - a plug-in's own validators may raise anything
+        problems.add(at, f"cannot be checked: {type(error).__name__}: {error}")
+        return None
 
 
 def _plugin(
@@ -164,9 +175,8 @@ def _plugin(
     installed = registry.names(group)
     own_module = group == registry.CONTROLLERS and "." in name
     if name not in installed and not own_module:
-        advice = nearest(name, installed).replace("known here:", "installed are")
-        own = ", or `package.module` of your own" if group == registry.CONTROLLERS else ""
-        problems.add(key, f"not installed; {advice}{own}", name)
+        own = "; a module of your own is named package.module" if group == registry.CONTROLLERS else ""
+        problems.add(key, f"not installed{own}; {nearest(name, installed)}", name)
         return None
     if own_module and not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)+", name):
         problems.add(key, "must be the dotted name of a Python module, such as mylab.laws", name)

@@ -30,7 +30,9 @@ class LoopConfig(Table):
         description="required: do not start without SCHED_FIFO and locked memory; preferred: run and warn; off",
     )
     priority: int = Field(80, ge=1, le=98, description="SCHED_FIFO priority")
-    cpu: int | None = Field(None, ge=0, description="processor to stay on; unset: the last one this process may use")
+    cpu: int | None = Field(
+        None, ge=0, le=4095, description="processor to stay on; unset: the last one this process may use"
+    )
     law_budget: float = Field(
         0.5,
         gt=0.0,

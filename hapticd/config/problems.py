@@ -47,7 +47,7 @@ class Problems:
     def add(self, path: Sequence[Key], sentence: str, *value: object) -> None:
         """Report a problem at a key, with the offending value where there is one."""
         shown = "".join(f" = {shown_value(item)}" for item in value)
-        line = f"{self.name}: {key_path(path)}{shown}: {sentence}" if path else f"{self.name}: {sentence}"
+        line = f"{self.name}: {key_path(path)}{shown}: {' '.join(sentence.splitlines())}"
         if line not in self.lines:
             self.lines.append(line)
 
@@ -214,6 +214,6 @@ def _declaration(model: type[BaseModel], path: Sequence[Key]) -> tuple[list[type
     return tables, field if path and isinstance(path[-1], str) else None
 
 
-def _number(bound: float) -> str:
+def _number(bound: Any) -> str:
     short = re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")
     return short if float(short) == bound else str(bound)

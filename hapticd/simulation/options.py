@@ -81,15 +81,15 @@ class RecordedForce(DriverOptions):
     points: tuple[tuple[Seconds, Newton], ...] = Field(
         (), max_length=10_000_000, description="[time s, force N] pairs, in order of time"
     )
-    file: str | None = Field(None, description="CSV file of such pairs, with or without a header line")
+    file: str | None = Field(
+        None, description="CSV file of such pairs, with or without a header line; read when points is empty"
+    )
     repeat: bool = Field(False, description="start again after the last point")
 
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, keys: Any) -> Any:
-        if isinstance(keys, dict) and isinstance(keys.get("file"), str):
-            if keys.get("points"):
-                raise ValueError("give either points or file")
+        if isinstance(keys, dict) and isinstance(keys.get("file"), str) and not keys.get("points"):
             return {**keys, "points": _recorded_points(Path(keys["file"]))}
         return keys
 

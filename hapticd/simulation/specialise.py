@@ -17,7 +17,9 @@ from typing import Any, TypeVar, cast
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
-def specialise(function: FunctionT, switches: Mapping[str, bool]) -> FunctionT:
+def specialise(
+    function: FunctionT, switches: Mapping[str, bool], calls: Mapping[str, Callable[..., Any]] | None = None
+) -> FunctionT:
     """A copy of a function without the branches that its switches rule out.
 
     Functions of the same module that it calls are specialised with it. The copy keeps name, file and line numbers,
@@ -26,12 +28,22 @@ def specialise(function: FunctionT, switches: Mapping[str, bool]) -> FunctionT:
     Args:
         function: a plain function whose source can be read.
         switches: name to on or off, for names that stand alone or first in an `if`.
+        calls: functions to put in the place of these names.
     """
-    return cast("FunctionT", _specialise(function, tuple(sorted(switches.items()))))
+    return cast(
+        "FunctionT",
+        _specialise(function, tuple(sorted(switches.items())), tuple(sorted((calls or {}).items(), key=_name))),
+    )
+
+
+def _name(item: tuple[str, Any]) -> str:
+    return item[0]
 
 
 @lru_cache(maxsize=256)
-def _specialise(function: FunctionType, switches: tuple[tuple[str, bool], ...]) -> FunctionType:
+def _specialise(
+    function: FunctionType, switches: tuple[tuple[str, bool], ...], calls: tuple[tuple[str, Any], ...]
+) -> FunctionType:
     lines, first = inspect.getsourcelines(function)
     tree = ast.parse(textwrap.dedent("".join(lines)))
     tree = ast.fix_missing_locations(_Pruner(dict(switches)).visit(tree))
@@ -41,12 +53,12 @@ def _specialise(function: FunctionType, switches: tuple[tuple[str, bool], ...]) 
     definition.returns = None
     for argument in definition.args.args:
         argument.annotation = None
-    called = {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)}
     names = dict(function.__globals__)
-    for name in called:
+    names.update(calls)
+    for name in {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)} - set(dict(calls)):
         callee = names.get(name)
         if isinstance(callee, FunctionType) and callee.__module__ == function.__module__ and callee is not function:
-            names[name] = _specialise(callee, switches)
+            names[name] = _specialise(callee, switches, calls)
     exec(compile(tree, inspect.getfile(function), "exec"), names)
     specialised = names[function.__name__]
     assert isinstance(specialised, FunctionType)

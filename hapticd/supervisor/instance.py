@@ -41,7 +41,7 @@ class InstanceLock:
                 f"instance {instance!r} is already running (process {holder or 'unknown'}); stop it, or choose "
                 "another with --instance"
             ) from error
-        if not path.exists() or os.stat(path).st_ino != os.fstat(self._descriptor).st_ino:
+        if not path.exists() or path.stat().st_ino != os.fstat(self._descriptor).st_ino:
             os.close(self._descriptor)
             raise InstanceError(f"instance {instance!r} is just being stopped or started by another daemon; try again")
         os.ftruncate(self._descriptor, 0)

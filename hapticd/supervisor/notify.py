@@ -24,5 +24,6 @@ class Notifier:
     def send(self, *lines: str) -> None:
         """Send assignments such as READY=1."""
         if self._socket is not None:
-            with contextlib.suppress(OSError):  # systemd being away is no reason to stop
-                self._socket.sendto("\n".join(lines).encode(), self._address)
+            # systemd being away or slow to read is no reason to stop or to wait.
+            with contextlib.suppress(OSError):
+                self._socket.sendto("\n".join(lines).encode(), socket.MSG_DONTWAIT, self._address)

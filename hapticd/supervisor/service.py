@@ -134,7 +134,6 @@ class Service:
             self._ticks += len(records)
             if before is None:
                 self.notifier.send("READY=1")
-                log.info("ticking")
             self._last = records[-1]
             self._feed_watchdog()
             if before is None or before.flags & ~Flag.LIMITED != self._last.flags & ~Flag.LIMITED:

@@ -85,15 +85,12 @@ class DriverContract:
 
     def test_each_step_of_life_may_be_called_twice(self, driver: AnyDriver) -> None:
         assert driver.open() is driver.open()
-        driver.enable()
-        driver.enable()
-        assert driver.state is DriverState.ENABLED
-        driver.disable()
-        driver.disable()
-        assert driver.state is DriverState.OPEN
-        driver.close()
-        driver.close()
-        assert driver.state is DriverState.CLOSED
+        states = []
+        for step in (driver.enable, driver.disable, driver.close):
+            step()
+            step()
+            states.append(driver.state)
+        assert states == [DriverState.ENABLED, DriverState.OPEN, DriverState.CLOSED]
 
     def test_it_can_be_opened_again_after_it_was_closed(self, driver: AnyDriver) -> None:
         for _ in range(2):

@@ -1,0 +1,54 @@
+# make run and make test need nothing set up beforehand: each installs what it lacks.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+# What tests and examples use besides Python; one list for this file, CI and the README.
+PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev
+
+.DEFAULT_GOAL := help
+.PHONY: help run test lint nightly bench packages clean
+
+help:
+	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
+	@echo "make test     everything that CI checks"
+	@echo "make lint     formatting, style, types and import rules only"
+	@echo "make nightly  the long runs over every shipped configuration"
+	@echo "make bench    how long a tick takes on this machine"
+	@echo "make clean    remove the virtual environment and all that tools left"
+
+run: $(READY)
+	$(BIN)/hapticd run --config config/hapticd.toml --watch
+
+test: packages lint
+	$(BIN)/pytest
+
+lint: $(READY)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+nightly: packages $(READY)
+	$(BIN)/pytest -m nightly --timeout 3600
+
+bench: $(READY)
+	$(BIN)/hapticd bench
+
+packages:
+	@.ci/packages $(PACKAGES)
+
+# Debian splits ensurepip off into python3-venv: without it venv fails, and .ci/packages fetches it or says how.
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "hapticd needs Python 3.11 or newer; say which one: make PYTHON=python3.11 ..."; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || .ci/packages python3-venv
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,238 @@
+"""The command line as a shell sees it: exit codes, plain lines on stderr, no tracebacks."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+import typer
+
+from hapticd import __version__
+from hapticd.cli import COMMANDS, application, main
+from hapticd.contracts.errors import DeviceNotFoundError
+from hapticd.share import directory
+
+HAPTICD = Path(sys.executable).with_name("hapticd")
+GOOD = str(directory("config") / "hapticd.toml")
+
+
+def hapticd(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [HAPTICD, *arguments], env={**os.environ, **environment}, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture
+def bad(tmp_path: Path) -> Path:
+    file = tmp_path / "bad.toml"
+    file.write_text("[loop]\nrate_hz = 50\n[controller]\nlaw = 'tdap'\n")
+    return file
+
+
+# -- the frame
+
+
+def test_version_and_help_are_answers() -> None:
+    assert hapticd("--version").stdout == f"hapticd {__version__}\n"
+    done = hapticd("--help")
+    assert done.returncode == 0
+    assert all(summary in done.stdout for summary in COMMANDS.values())
+
+
+def test_no_command_is_a_misuse_that_shows_the_overview() -> None:
+    done = hapticd()
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Commands:" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named", "advice"),
+    [
+        (["chek"], "'check'", "hapticd --help"),
+        (["check"], "FILE...", "hapticd check --help"),
+        (["check", "--jsn"], "--json", "hapticd check --help"),
+        (["config", "shw"], "'show'", "hapticd config --help"),
+    ],
+)
+def test_misuse_is_a_line_with_advice_and_exit_code_2(arguments: list[str], named: str, advice: str) -> None:
+    done = hapticd(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    line, see = done.stderr.splitlines()
+    assert line.startswith("hapticd: ")
+    assert named in line
+    assert see == f"  see {advice}"
+
+
+def test_the_overview_imports_no_command_and_nothing_heavy() -> None:
+    script = (
+        "import sys\nfrom hapticd.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'pydantic', 'zmq', 'rich', 'tomlkit', 'numpy', 'numba', 'asyncio'} & set(sys.modules)\n"
+        "sys.exit(repr(heavy) if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def commands_of(app: typer.Typer, *path: str) -> list[tuple[str, ...]]:
+    groups = [(group.name or "", group.typer_instance) for group in app.registered_groups]
+    names = [command.name or getattr(command.callback, "__name__", "") for command in app.registered_commands]
+    inner = [found for name, group in groups if group for found in commands_of(group, *path, name)]
+    return [(*path, name) for name in names] + inner
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for path in commands_of(application(name)):
+        if path[0] != name:
+            continue
+        with pytest.raises(SystemExit) as ended:
+            main([*path, "--help"])
+        shown = capsys.readouterr().out
+        assert ended.value.code == 0
+        assert f"Example: hapticd {' '.join(path)}" in shown
+        if len(path) == 1:
+            assert COMMANDS[name] in shown, "the overview and the command say different things"
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "lines"),
+    [
+        (
+            DeviceNotFoundError("omega7: nothing there\n  plug it in"),
+            1,
+            "hapticd: omega7: nothing there\n  plug it in\n",
+        ),
+        (KeyboardInterrupt(), 130, ""),
+        (typer.Abort(), 1, "hapticd: nothing done\n"),
+        (ZeroDivisionError("oh"), 1, "hapticd: defect: ZeroDivisionError: oh\n"),
+    ],
+)
+def test_an_error_is_lines_and_an_exit_code(
+    error: BaseException, status: int, lines: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(_: str) -> None:
+        raise error
+
+    monkeypatch.delenv("HAPTICD_DEBUG", raising=False)
+    monkeypatch.setattr("hapticd.cli.check.load", fail)
+    with pytest.raises(SystemExit) as ended:
+        main(["check", "x.toml"])
+    assert ended.value.code == status
+    assert capsys.readouterr().err.startswith(lines)
+
+
+def test_whoever_debugs_gets_the_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HAPTICD_DEBUG", "1")
+    monkeypatch.setattr("hapticd.cli.check.load", lambda _: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        main(["check", "x.toml"])
+
+
+def test_an_interrupt_ends_with_130(tmp_path: Path) -> None:
+    fifo = tmp_path / "never.toml"
+    os.mkfifo(fifo)
+    waiting = subprocess.Popen([HAPTICD, "check", fifo], stderr=subprocess.PIPE, text=True)
+    with fifo.open("w"):  # opens once the command reads, and gives it nothing
+        waiting.send_signal(signal.SIGINT)
+        _, errors = waiting.communicate(timeout=20)
+    assert (waiting.returncode, errors) == (130, "")
+
+
+def test_a_reader_that_leaves_early_is_no_error_message() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([HAPTICD, "config", "schema"], stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(write)
+    assert done.stderr == ""
+
+
+# -- check
+
+
+def test_check_prints_a_line_for_each_good_file_and_every_problem_of_the_others(bad: Path) -> None:
+    done = hapticd("check", GOOD, bad, bad.parent / "absent.toml")
+    assert done.returncode == 2
+    (line,) = done.stdout.splitlines()
+    assert line.startswith(f"{GOOD}: ok, ")
+    assert line.endswith(", loopback with energy-cycle at 1000 Hz")
+    assert [problem.split(": ")[:2] for problem in done.stderr.splitlines()] == [
+        [str(bad), "loop.rate_hz = 50"],
+        [str(bad), 'controller.law = "tdap"'],
+        [str(bad.parent / "absent.toml"), "no such file"],
+    ]
+
+
+def test_check_as_json_says_the_same(bad: Path) -> None:
+    done = hapticd("check", "--json", GOOD, bad)
+    good, wrong = json.loads(done.stdout)
+    assert (done.returncode, done.stderr) == (2, "")
+    assert (good["ok"], good["driver"], good["law"], good["rate_hz"]) == (True, "loopback", "energy-cycle", 1000.0)
+    assert good["sha256"].startswith(good["hash"])
+    assert (wrong["ok"], len(wrong["problems"])) == (False, 2)
+
+
+def test_check_of_good_files_succeeds() -> None:
+    files = sorted(directory("config").glob("*.toml"))
+    done = hapticd("check", *files)
+    assert (done.returncode, done.stderr, len(done.stdout.splitlines())) == (0, "", len(files))
+
+
+# -- config, devices, controllers
+
+
+def test_config_show_fills_in_the_defaults() -> None:
+    shown = tomllib.loads(hapticd("config", "show", GOOD).stdout)
+    assert shown["safety"]["ramp_s"] == 0.05
+    assert shown["device"]["options"]["mass_kg"] == 0.25
+    assert shown["controller"]["params"]["rule"] == "non-decreasing"
+
+
+def test_config_show_of_a_bad_file_prints_its_problems(bad: Path) -> None:
+    done = hapticd("config", "show", bad)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert [line.startswith(f"hapticd: {bad}: ") for line in done.stderr.splitlines()] == [True, True]
+
+
+def test_config_schema_is_json() -> None:
+    assert json.loads(hapticd("config", "schema").stdout)["title"] == "hapticd configuration"
+
+
+def test_devices_lists_options_with_units_and_branches() -> None:
+    (loopback,) = [plugin for plugin in json.loads(hapticd("devices", "--json").stdout) if plugin["name"] == "loopback"]
+    parameters = {(parameter["key"], parameter["only_with"]): parameter for parameter in loopback["parameters"]}
+    mass = parameters["mass_kg", ""]
+    assert (mass["default"], mass["unit"], mass["required"]) == (0.25, "kg", False)
+    assert parameters["changes[].at_s", ""]["required"]
+    assert parameters["hand.force.newton", 'hand.force.profile = "step"']["unit"] == "N"
+
+
+def test_controllers_lists_laws_for_people() -> None:
+    shown = hapticd("controllers", COLUMNS="200").stdout
+    assert "tdpa  Time-domain passivity control." in shown
+    assert "damping_cap_n_s_per_m" in shown
+    assert '"spring" | "total"' in shown
+    only = hapticd("controllers", "none").stdout
+    assert "tdpa" not in only
+
+
+def test_a_plugin_that_cannot_be_imported_is_listed_with_the_reason(tmp_path: Path) -> None:
+    information = tmp_path / "broken-1.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
+    (information / "entry_points.txt").write_text("[hapticd.drivers]\nbroken = broken_driver:Broken\n")
+    (tmp_path / "broken_driver.py").write_text("import no_such_library")
+    done = hapticd("devices", "--json", PYTHONPATH=str(tmp_path))
+    assert done.returncode == 0
+    problems = {plugin["name"]: plugin["problem"] for plugin in json.loads(done.stdout)}
+    assert problems["loopback"] == ""
+    assert "No module named 'no_such_library'" in problems["broken"]
+    assert "cannot be used" in hapticd("devices", PYTHONPATH=str(tmp_path)).stdout
+    assert "driver.broken" not in json.loads(hapticd("config", "schema", PYTHONPATH=str(tmp_path)).stdout)["$defs"]
+    alone = hapticd("devices", "broken", PYTHONPATH=str(tmp_path))
+    assert (alone.returncode, alone.stdout) == (2, "")

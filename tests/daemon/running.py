@@ -1,0 +1,162 @@
+"""A real daemon for a test: started as a user would, ready when it tells systemd so, looked at from outside."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import zmq
+
+from hapticd.contracts.record import RecordLayout, TickRecord
+from hapticd.control.shared import RECORDS, RecordReader, SharedMemory
+
+HAPTICD = str(Path(sys.executable).parent / "hapticd")
+PATIENCE_S = 30.0
+"""How long anything may take on a busy machine before a test gives up."""
+
+
+class Daemon:
+    """`hapticd run` in a process of its own, with a runtime directory of its own."""
+
+    def __init__(
+        self, config: str, *, prefix: Sequence[str] = (), pythonpath: Path | None = None, closed: bool = False
+    ) -> None:
+        self.directory = Path(tempfile.mkdtemp(prefix="hapticd-"))  # short: an ipc path has at most 107 characters
+        self.config = self.directory / "lab.toml"
+        self.config.write_text(config)
+        self.log = self.directory / "log"
+        self.endpoint = f"ipc://{self.directory}/run/default/telemetry"
+        (self.directory / "run").mkdir(mode=0o500 if closed else 0o700)
+        self._notify = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._notify.bind(str(self.directory / "notify"))
+        environment = {
+            **os.environ,
+            "HAPTICD_RUNTIME_DIR": str(self.directory / "run"),
+            "NOTIFY_SOCKET": str(self.directory / "notify"),
+        }
+        environment.pop("WATCHDOG_USEC", None)
+        if pythonpath is not None:
+            environment["PYTHONPATH"] = str(pythonpath)
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(
+                [*prefix, HAPTICD, "run", "--config", str(self.config)], env=environment, stderr=log, stdout=log
+            )
+
+    def __enter__(self) -> Daemon:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for pid in (self.control_pid(), self.process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                if pid:
+                    os.kill(pid, signal.SIGCONT)
+                    os.kill(pid, signal.SIGKILL)
+        self.process.wait()
+        self._notify.close()
+        shutil.rmtree(self.directory, ignore_errors=True)
+
+    def wait_ready(self) -> Daemon:
+        """Return when the daemon has said that it ticks."""
+        self.notified("READY=1")
+        return self
+
+    def notified(self, line: str) -> None:
+        """Return when the daemon has sent this line to systemd."""
+        end_s = time.monotonic() + PATIENCE_S
+        self._notify.settimeout(0.2)
+        while time.monotonic() < end_s:
+            with contextlib.suppress(TimeoutError):
+                if line in self._notify.recv(4096).decode().splitlines():
+                    return
+            assert self.process.poll() is None, f"the daemon ended before {line}: {self.output()}"
+        raise AssertionError(f"no {line} from the daemon: {self.output()}")
+
+    def output(self) -> str:
+        return self.log.read_text()
+
+    def control_pid(self) -> int:
+        """Process of the control loop; 0 when there is none."""
+        for entry in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                command = (entry / "cmdline").read_bytes().split(b"\0")
+                if b"hapticd.control.process" in command and str(self.process.pid).encode() in command:
+                    return int(entry.name)
+        return 0
+
+    def memory(self) -> SharedMemory:
+        """The control process's shared memory, which outlives it while we hold it."""
+        pid = self.control_pid()
+        for link in Path(f"/proc/{pid}/fd").iterdir():
+            if "memfd:hapticd" in str(link.readlink()):
+                layout = RecordLayout(1, False, 8)
+                return SharedMemory(layout, 1000.0, os.open(link, os.O_RDWR | os.O_CLOEXEC))
+        raise AssertionError("the control process has no shared memory")
+
+    def wait_exit(self) -> int:
+        return self.process.wait(PATIENCE_S)
+
+
+class Subscriber:
+    """A subscriber with no code of hapticd in it."""
+
+    def __init__(self, endpoint: str, *topics: str) -> None:
+        self.context = zmq.Context()
+        self.socket = self.context.socket(zmq.SUB)
+        self.socket.setsockopt(zmq.RCVHWM, 0)
+        for topic in topics or ("hapticd/",):
+            self.socket.setsockopt(zmq.SUBSCRIBE, topic.encode())
+        self.socket.connect(endpoint)
+
+    def __enter__(self) -> Subscriber:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close(0)
+        self.context.term()
+
+    def maps(self, patience_s: float = PATIENCE_S) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Topic and map of everything that comes; ends when nothing has come for so long."""
+        while self.socket.poll(int(patience_s * 1e3)):
+            topic, payload = self.socket.recv_multipart()
+            for fields in msgpack.unpackb(payload):
+                yield topic.decode(), fields
+
+    def until(self, topic: str, **wanted: Any) -> dict[str, Any]:
+        """The next map of a topic that has these values."""
+        for name, fields in self.maps():
+            if name == topic and all(fields[key] == value for key, value in wanted.items()):
+                return fields
+        raise AssertionError(f"no {topic} with {wanted} came")
+
+
+def all_records(memory: SharedMemory) -> list[TickRecord]:
+    """Every record that the ring still holds."""
+    reader = RecordReader(memory)
+    reader._next = max(0, memory.words[RECORDS] - memory.slots + 2)
+    return reader.read(memory.slots)
+
+
+def gone(pid: int) -> bool:
+    """Whether a process has ended (a zombie has)."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return True
+
+
+def wait_until(condition: Any, what: str) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, f"waited in vain for: {what}"
+        time.sleep(0.005)

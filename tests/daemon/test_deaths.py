@@ -1,0 +1,172 @@
+"""Who dies, and what follows: every row provoked on a real daemon that presses a wall."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from hapticd.contracts.event import EventCode
+from hapticd.contracts.record import TickRecord
+from tests.daemon.running import Daemon, Subscriber, all_records, gone, wait_until
+
+PRESSED = """
+[device.options]
+model = "omega7"
+hand = { force = { profile = "constant", newton = -3.0 } }
+
+[[scene.walls]]
+stiffness_n_per_m = 12000.0
+"""
+
+ENDLESS_LAW = '''
+"""A law that never returns once it has been asked 300 times in contact."""
+from hapticd.contracts.law import LawParams
+class Params(LawParams):
+    """None."""
+class State:
+    """Counts."""
+    asked: int
+def start(state, params, snapshot):
+    """Count from zero."""
+def step(state, params, tick):
+    """Hang at 300; the warm-up before the loop takes 200."""
+    state.asked += 1
+    while state.asked > 300:
+        pass
+    return tick.contact_n
+'''
+
+
+def pressing(daemon: Daemon) -> None:
+    """Return when the daemon holds a force against the hand."""
+    with Subscriber(daemon.endpoint, "hapticd/position") as subscriber:
+        for _, fields in subscriber.maps():
+            if fields["seq"] > 500 and abs(fields["force_n"][0]) > 2.0:
+                return
+
+
+def largest_step_n(records: Sequence[TickRecord]) -> float:
+    return max(abs(after.force_n[0] - before.force_n[0]) for before, after in pairwise(records))
+
+
+def nothing_left(daemon: Daemon) -> bool:
+    directory = daemon.directory / "run" / "default"
+    return not list(directory.iterdir()) and not daemon.control_pid()
+
+
+def test_a_killed_supervisor_takes_the_force_with_it(record_property: Callable[[str, object], None]) -> None:
+    with Daemon(PRESSED).wait_ready() as daemon:
+        pressing(daemon)
+        memory = daemon.memory()
+        pid = daemon.control_pid()
+        killed_ns = time.monotonic_ns()
+        daemon.process.kill()
+        daemon.process.wait()
+        wait_until(lambda: gone(pid), "the control process to end")
+        record_property("exit_after_ms", (time.monotonic_ns() - killed_ns) * 1e-6)
+        after = [record for record in all_records(memory) if record.deadline_ns > killed_ns]
+        assert after[-1].force_n == (0.0,)
+        assert len(after) <= 100, "at 1 kHz the force must be out within 100 ticks"
+        assert largest_step_n(after) < 1.0, "a ramp, not a step"
+        memory.close()
+
+
+def test_a_supervisor_that_sleeps_for_a_while_costs_the_loop_nothing() -> None:
+    with (
+        Daemon(PRESSED).wait_ready() as brief,
+        Daemon(PRESSED + "[safety]\nsupervisor_stall_s = 60.0\n").wait_ready() as long,
+        Daemon(PRESSED + "[safety]\nsupervisor_stall_s = 1.0\n").wait_ready() as strict,
+        Subscriber(brief.endpoint) as from_brief,
+        Subscriber(long.endpoint) as from_long,
+        Subscriber(strict.endpoint) as from_strict,
+    ):
+        for daemon in (brief, long, strict):
+            pressing(daemon)
+        for daemon in (brief, long, strict):
+            daemon.process.send_signal(signal.SIGSTOP)
+        time.sleep(5.0)
+        brief.process.send_signal(signal.SIGCONT)
+        strict.process.send_signal(signal.SIGCONT)
+
+        last = -1
+        for topic, fields in from_brief.maps():
+            if topic == "hapticd/position":
+                assert last in (-1, fields["seq"] - 1), "no tick may be lost in a ring that holds eight seconds"
+                last = fields["seq"]
+                if last > 8000:
+                    break
+            assert topic != "hapticd/event" or fields["code"] < 200 or fields["code"] >= 300
+
+        event = from_strict.until("hapticd/event", code=EventCode.SUPERVISOR_STALLED)
+        after = [record for record in all_records(strict.memory()) if record.seq > event["seq"] + 60]
+        assert after
+        assert all(record.force_n == (0.0,) for record in after)
+
+        time.sleep(4.5)  # more than the ring holds
+        long.process.send_signal(signal.SIGCONT)
+        dropped = from_long.until("hapticd/event", code=EventCode.RING_DROPPED)
+        status = from_long.until("hapticd/status")
+        assert dropped["text"].startswith(f"{status['ring_drops']} ticks")
+        assert status["armed"]
+
+
+def test_a_killed_control_process_ends_the_service() -> None:
+    with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
+        pressing(daemon)
+        os.kill(daemon.control_pid(), signal.SIGKILL)
+        event = subscriber.until("hapticd/event", code=EventCode.CONTROL_LOST)
+        assert "killed by signal 9" in event["text"]
+        assert "without force" in event["text"]
+        assert daemon.wait_exit() == 1
+        assert nothing_left(daemon)
+
+
+def test_a_stopped_control_process_is_killed_and_the_device_released() -> None:
+    with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
+        pressing(daemon)
+        pid = daemon.control_pid()
+        os.kill(pid, signal.SIGSTOP)
+        event = subscriber.until("hapticd/event", code=EventCode.CONTROL_LOST)
+        assert "stood still" in event["text"]
+        assert daemon.wait_exit() == 1
+        assert gone(pid)
+        assert nothing_left(daemon)
+
+
+def test_an_endless_law_is_a_stalled_control_process(tmp_path: Path) -> None:
+    package = tmp_path / "mylab"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "endless.py").write_text(ENDLESS_LAW)
+    config = PRESSED + '[controller]\nlaw = "mylab.endless"\n'
+    with Daemon(config, pythonpath=tmp_path) as daemon:
+        assert daemon.wait_exit() == 1
+        assert "stood still" in daemon.output()
+        assert "without force" in daemon.output()
+        assert nothing_left(daemon)
+
+
+def test_sigterm_ramps_the_force_out_and_ends_well() -> None:
+    with Daemon(PRESSED).wait_ready() as daemon:
+        pressing(daemon)
+        memory = daemon.memory()
+        told_ns = time.monotonic_ns()
+        daemon.process.send_signal(signal.SIGTERM)
+        assert daemon.wait_exit() == 0
+        after = [record for record in all_records(memory) if record.deadline_ns > told_ns]
+        assert after[-1].force_n == (0.0,)
+        assert sum(0.0 < record.force_n[0] < 2.9 for record in after) > 20
+        assert largest_step_n(after) < 1.0, "a ramp, not a step"
+        assert nothing_left(daemon)
+        memory.close()
+
+
+def test_an_interrupt_at_the_terminal_ends_it_as_well() -> None:
+    with Daemon(PRESSED).wait_ready() as daemon:
+        daemon.process.send_signal(signal.SIGINT)
+        assert daemon.wait_exit() == 0
+        assert nothing_left(daemon)
