@@ -1,7 +1,7 @@
 """The layout that hapticd does not have: telemetry as a thread of the loop's own interpreter.
 
-The negative control of `hapticd.bench.lateness`. The loop, its set-up and what the publisher does are the daemon's; only
-the second process is missing. A harness that lets this pass measures nothing.
+The negative control of `hapticd.bench.lateness`. The loop, its set-up and what the publisher does are the daemon's;
+only the second process is missing. A harness that lets this pass measures nothing.
 """
 
 from __future__ import annotations

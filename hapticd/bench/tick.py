@@ -205,8 +205,16 @@ class Ticks:
         """The same without the first so many seconds."""
         limit_ns = self.deadline_ns[0] + settle_s * 1e9 if self.deadline_ns else 0.0
         first = sum(deadline_ns < limit_ns for deadline_ns in self.deadline_ns)
-        columns = (self.seq, self.deadline_ns, self.late_us, self.busy_us, self.skipped)
-        return Ticks(*(column[first:] for column in columns), self.dropped, self.fault, self.warnings)  # type: ignore[misc]
+        return Ticks(
+            self.seq[first:],
+            self.deadline_ns[first:],
+            self.late_us[first:],
+            self.busy_us[first:],
+            self.skipped[first:],
+            self.dropped,
+            self.fault,
+            self.warnings,
+        )
 
 
 class KeptRecords(RecordReader):
@@ -377,7 +385,7 @@ def measure(
     """
     machine = watch_machine()
     measured = measure_bodies(cases(), ticks, rounds, progress)
-    rates = []
+    rates: list[Rate] = []
     for rate_hz in rates_hz if rate_s else ():
         rates.append(measure_rate(rate_hz, rate_s, rates[0].late_us.p50 if rates else 0.0))
         progress(rate_s)
@@ -462,9 +470,9 @@ def measure_rate(rate_hz: float, seconds: float, reference_us: float = 0.0) -> R
         raise HapticdError(f"the daemon ran no ticks at {rate_hz:g} Hz: {ticks.fault or 'it gave no reason'}")
     # Sequence numbers and the loop's own count of skips also cover ticks that were never fetched.
     executed = ticks.seq[-1] - ticks.seq[0]
-    late = LateHistogram()
-    for late_us in ticks.late_us:
-        late.add(late_us)
+    histogram = LateHistogram()
+    for each_us in ticks.late_us:
+        histogram.add(each_us)
     late_us = Quantiles.of(ticks.late_us)
     return Rate(
         rate_hz=rate_hz,
@@ -474,7 +482,7 @@ def measure_rate(rate_hz: float, seconds: float, reference_us: float = 0.0) -> R
         dropped=ticks.dropped,
         late_us=late_us,
         busy_us=Quantiles.of(ticks.busy_us),
-        late_histogram=tuple(late.counts),
+        late_histogram=tuple(histogram.counts),
         late_p50_ratio=ratio(late_us.p50, reference_us or late_us.p50),
         fault=ticks.fault,
         warnings=ticks.warnings,
@@ -482,30 +490,33 @@ def measure_rate(rate_hz: float, seconds: float, reference_us: float = 0.0) -> R
 
 
 def judge(bodies: Sequence[Body], realtime: bool, others: float) -> list[Bar]:
-    """Hold p99 of each law and configuration against `BAR`.
+    """Hold each law and each configuration against `BAR`; arguments as for `judge_body`."""
+    return [
+        judge_body(f"{body.group} {body.name}", body.of_period, realtime, others)
+        for body in bodies
+        if body.group in ("law", "config") and not body.problem
+    ]
+
+
+def judge_body(name: str, of_period: float, realtime: bool, others: float) -> Bar:
+    """Hold p99 of a tick body against `BAR`.
 
     What disturbs a tick only adds to its time, so a pass is a pass anywhere; a miss counts only under real-time
     scheduling and on a machine that has nothing else to do.
 
     Args:
-        bodies: what was measured.
-        realtime: whether it was under real-time scheduling.
+        name: whose body it is.
+        of_period: its p99 as a share of the period.
+        realtime: whether it was measured under real-time scheduling.
         others: processors that other programs kept busy.
     """
-    bars = []
-    for body in bodies:
-        if body.group not in ("law", "config") or body.problem:
-            continue
-        verdict: Verdict = "PASS"
-        note = ""
-        if body.of_period > BAR:
-            verdict = "FAIL"
-            if not realtime:
-                verdict, note = "INCONCLUSIVE", "not under SCHED_FIFO"
-            elif others > CALM:
-                verdict, note = "INCONCLUSIVE", f"other programs kept {others:.2f} processors busy"
-        bars.append(Bar(f"{body.group} {body.name}: tick body p99 / period", body.of_period, BAR, verdict, note))
-    return bars
+    verdict: Verdict = "PASS" if of_period <= BAR else "FAIL"
+    note = ""
+    if verdict == "FAIL" and not realtime:
+        verdict, note = "INCONCLUSIVE", "not under SCHED_FIFO"
+    elif verdict == "FAIL" and others > CALM:
+        verdict, note = "INCONCLUSIVE", f"other programs kept {others:.2f} processors busy"
+    return Bar(f"{name}: tick body p99 / period", of_period, BAR, verdict, note)
 
 
 def stopwatch(

@@ -109,7 +109,11 @@ def state_fields(law: ModuleType) -> dict[str, type[Scalar]]:
         PluginError: a field is not declared as float, int or bool.
     """
     fields: dict[str, type[Scalar]] = {}
-    for name, kind in typing.get_type_hints(law.State).items():
+    try:
+        hints = typing.get_type_hints(law.State)
+    except Exception as error:  # noqa: BLE001 - an annotation may name anything
+        raise PluginError(f"law {law.__name__}: the annotations of State make no sense: {error}") from error
+    for name, kind in hints.items():
         if kind not in (float, int, bool):
             raise PluginError(f"law {law.__name__}: State.{name} must be float, int or bool, not {kind}")
         fields[name] = kind

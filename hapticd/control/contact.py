@@ -5,9 +5,14 @@ from __future__ import annotations
 from types import ModuleType
 from typing import Any
 
+from hapticd.contracts.errors import PluginError
 from hapticd.contracts.law import LawParams, LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
 from hapticd.energy import EnergyLedger
+from hapticd.guard import blended, start_blend
 from hapticd.scene import Wall
+
+MOST = 1e18
+"""A law that asks for more [N], or publishes more, is broken, whatever the limits are."""
 
 
 class RunningLaw:
@@ -18,7 +23,7 @@ class RunningLaw:
         params: its validated parameters.
     """
 
-    __slots__ = ("module", "params", "publishes_damping", "publishes_mass", "state", "step")
+    __slots__ = ("module", "params", "publishes", "publishes_damping", "publishes_mass", "state", "step")
 
     def __init__(self, module: ModuleType, params: LawParams) -> None:
         self.module = module
@@ -27,20 +32,26 @@ class RunningLaw:
         self.step = module.step
         self.publishes_damping = hasattr(self.state, "damping_n_s_per_m")
         self.publishes_mass = hasattr(self.state, "felt_mass_kg")
+        self.publishes = self.publishes_damping or self.publishes_mass
 
-    @property
-    def damping_n_s_per_m(self) -> float:
-        """Damping that the law has reached [N s/m]; 0 when it has none."""
-        return self.state.damping_n_s_per_m if self.publishes_damping else 0.0
+    def start(self, snapshot: LawSnapshot) -> None:
+        """Activate the law.
 
-    @property
-    def felt_mass_kg(self) -> float:
-        """Mass that the law has identified [kg]; 0 while unknown."""
-        return self.state.felt_mass_kg if self.publishes_mass else 0.0
+        Raises:
+            PluginError: the law raised.
+        """
+        try:
+            self.module.start(self.state, self.params, snapshot)
+        except Exception as error:  # noqa: BLE001 - a law is anybody's code
+            raise PluginError(
+                f"law {self.module.__name__} cannot start: {type(error).__name__}: {error}"
+            ) from error
 
 
 class Contact:
     """One wall, the law that stabilises it and the ledger that watches both.
+
+    What the law is shown is a copy: nothing that it writes there reaches the force, the books or the next tick.
 
     Args:
         wall: the compiled wall.
@@ -48,54 +59,114 @@ class Contact:
         resolution_m: smallest step of the device's position [m].
 
     Attributes:
+        x_m: position relative to the wall, < 0 inside [m].
+        in_contact: whether it is inside.
         requested_n: what the law asked for in this tick, outward [N].
         force_n: the same after the blend of a transition, before the guard's share [N].
+        applied_n: what was applied in the end [N].
+        damping_n_s_per_m, felt_mass_kg: as published by the law; 0 when it has none.
     """
 
-    __slots__ = ("_applied_spring_n", "_blend_n", "_blend_pending", "_blend_step_n", "_ramp_ticks", "force_n", "law", "ledger", "requested_n", "tick", "wall")
+    __slots__ = (
+        "_applied_contact_n",
+        "_applied_spring_n",
+        "_contact_n",
+        "_moved_m",
+        "_resolution_m",
+        "applied_n",
+        "blend_from_n",
+        "blend_from_x_m",
+        "blend_limit_n",
+        "blend_tick",
+        "blend_ticks",
+        "blending",
+        "damping_n_s_per_m",
+        "felt_mass_kg",
+        "force_n",
+        "in_contact",
+        "law",
+        "ledger",
+        "requested_n",
+        "tick",
+        "wall",
+        "x_m",
+    )
 
     def __init__(self, wall: Wall, law: RunningLaw, resolution_m: float) -> None:
         self.wall = wall
         self.law = law
         self.ledger = EnergyLedger()
         self.tick = LawTick(resolution_m)
+        self.x_m = 0.0
+        self.in_contact = False
         self.requested_n = 0.0
         self.force_n = 0.0
+        self.applied_n = 0.0
+        self.damping_n_s_per_m = 0.0
+        self.felt_mass_kg = 0.0
+        self.blending = False
+        self._moved_m = 0.0
+        self._contact_n = 0.0
+        self._applied_contact_n = 0.0
         self._applied_spring_n = 0.0
-        self._blend_n = 0.0
-        self._blend_step_n = 0.0
-        self._blend_pending = False
-        self._ramp_ticks = 1
+        self._resolution_m = resolution_m
 
     def start(self, position_m: float) -> None:
-        """Begin at a position, at rest and without force."""
-        self.tick.x_m = self.wall.outward * (position_m - self.wall.position_m)
-        self.law.module.start(self.law.state, self.law.params, LawSnapshot(x_m=self.tick.x_m))
+        """Be at a position, at rest and without force."""
+        self.x_m = self.wall.outward * (position_m - self.wall.position_m)
+        self.in_contact = self.x_m < 0.0
+        self.lose_sight()
 
     def lose_sight(self) -> None:
-        """Forget what was applied: the position was unknown for a while, and the force has been let out."""
-        self.tick.applied_n = self.tick.applied_contact_n = self._applied_spring_n = 0.0
+        """Forget what was applied: the position is unknown for a while, and the force is let out elsewhere."""
+        self.blending = False
         self.force_n = self.requested_n = 0.0
+        self.applied_n = self._applied_contact_n = self._applied_spring_n = 0.0
+        self.tick.applied_n = self.tick.applied_contact_n = 0.0
 
-    def switch_law(self, law: RunningLaw, ramp_ticks: int) -> None:
-        """Hand over to another law, without a step in force: the difference is ramped out over `ramp_ticks`."""
-        tick = self.tick
-        snapshot = LawSnapshot(
-            tick.x_m, tick.velocity_m_per_s, tick.applied_n, self.ledger.debt_j, self.law.damping_n_s_per_m
-        )
-        law.module.start(law.state, law.params, snapshot)
+    def snapshot(self, velocity_m_per_s: float) -> LawSnapshot:
+        """What a law is told that takes over now.
+
+        Args:
+            velocity_m_per_s: velocity of the wall's axis [m/s].
+        """
+        velocity_m_per_s = self.wall.outward * velocity_m_per_s
+        return LawSnapshot(self.x_m, velocity_m_per_s, self.applied_n, self.ledger.debt_j, self.damping_n_s_per_m)
+
+    def take_law(self, law: RunningLaw, velocity_m_per_s: float, dt_s: float) -> None:
+        """Go on with another law, already started; the caller blends.
+
+        Args:
+            law: the law.
+            velocity_m_per_s: velocity of the wall's axis [m/s].
+            dt_s: time between the last two samples [s].
+        """
         self.law = law
-        self.blend(ramp_ticks)
+        self.damping_n_s_per_m = self.felt_mass_kg = 0.0
+        # The law before may have left anything in its tick.
+        self.tick = tick = LawTick(self._resolution_m)
+        tick.x_m = self.x_m
+        tick.moved_m = self._moved_m
+        tick.velocity_m_per_s = self.wall.outward * velocity_m_per_s
+        tick.dt_s = dt_s
+        tick.in_contact = self.in_contact
+        tick.contact_n = self._contact_n
+        tick.applied_n = self.applied_n
+        tick.applied_contact_n = self._applied_contact_n
 
-    def switch_wall(self, wall: Wall, ramp_ticks: int) -> None:
-        """Become another wall in the same place, without a step in force."""
-        self.wall = wall
-        self.blend(ramp_ticks)
+    def blend(self, ticks: int, gain: float, limit_n: float) -> None:
+        """Start the next force where the applied one is now, and go over to what the law asks for.
 
-    def blend(self, ramp_ticks: int) -> None:
-        """Start the next force where the applied one is now, and let the difference fade over `ramp_ticks`."""
-        self._blend_pending = True
-        self._ramp_ticks = ramp_ticks
+        Outside the wall there is nothing to blend: what comes then comes from the device's own motion.
+
+        Args:
+            ticks: how many it takes.
+            gain: the guard's gain that the next force will be multiplied by.
+            limit_n: the guard's limit for one contact [N].
+        """
+        self.blending = False
+        if self.in_contact:
+            start_blend(self, self.applied_n / gain if gain > 0.0 else 0.0, self.x_m, limit_n, ticks)
 
     def observe(self, position_m: float, velocity_m_per_s: float, dt_s: float) -> None:
         """See a new sample.
@@ -110,58 +181,86 @@ class Contact:
         if wall.changes_left:
             wall.count_tick()
         x_m = wall.outward * (position_m - wall.position_m)
-        tick.moved_m = x_m - tick.x_m
-        tick.x_m = x_m
+        tick.moved_m = self._moved_m = x_m - self.x_m
+        tick.x_m = self.x_m = x_m
         tick.velocity_m_per_s = velocity_m_per_s = wall.outward * velocity_m_per_s
         tick.dt_s = dt_s
         if x_m < 0.0:
-            tick.in_contact = True
-            tick.contact_n = wall.force(x_m, velocity_m_per_s)
+            tick.in_contact = self.in_contact = True
+            tick.contact_n = self._contact_n = wall.force(x_m, velocity_m_per_s)
         else:
-            tick.in_contact = False
-            tick.contact_n = wall.spring_n = 0.0
+            tick.in_contact = self.in_contact = False
+            tick.contact_n = self._contact_n = wall.spring_n = 0.0
 
-    def act(self) -> float:
-        """What this contact asks for, outward [N]."""
-        tick = self.tick
+    def act(self) -> None:
+        """Ask the law for its force.
+
+        Raises:
+            BaseException: whatever the law raises.
+            ArithmeticError: it returned or publishes something beyond all bounds.
+            TypeError: it returned or publishes something that is not a number.
+        """
         law = self.law
-        force_n: float = law.step(law.state, law.params, tick)
-        if not tick.in_contact:
+        force_n = law.step(law.state, law.params, self.tick)
+        if law.publishes:
+            state = law.state
+            if law.publishes_damping:
+                self.damping_n_s_per_m = _number(state.damping_n_s_per_m)
+            if law.publishes_mass:
+                self.felt_mass_kg = _number(state.felt_mass_kg)
+        if not self.in_contact:
             # Nothing is sent outside, whatever the law says; it still sees the tick, to know that contact is lost.
-            self._blend_pending = False
-            self._blend_n = self.requested_n = self.force_n = 0.0
-            return 0.0
+            self.blending = False
+            self.requested_n = self.force_n = 0.0
+            return
+        if force_n.__class__ is not float or not -MOST < force_n < MOST:  # the latter is false for NaN as well
+            force_n = _number(force_n)
         self.requested_n = force_n
-        if self._blend_pending:
-            self._blend_pending = False
-            self._blend_n = tick.applied_n - force_n
-            self._blend_step_n = self._blend_n / self._ramp_ticks
-        elif self._blend_n != 0.0:
-            left_n = self._blend_n - self._blend_step_n
-            # Past zero the sign turns: the blend is over.
-            self._blend_n = left_n if left_n * self._blend_step_n > 0.0 else 0.0
-        self.force_n = force_n = force_n + self._blend_n
-        return force_n
+        self.force_n = blended(self, self.x_m, force_n) if self.blending else force_n
 
-    def settle(self, share: float, limit_n: float) -> None:
+    def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
         """Enter the tick into the books and remember what is applied from now on.
+
+        The books take the spring for what it is, flat from the limit on and fading with a release; what walls that
+        share a limit, dampers and blends make of it counts as dissipated.
 
         Args:
             share: how much of the force the guard let through, 0 to 1.
-            limit_n: the guard's force limit [N].
+            gain: how much of that a release has left, 0 to 1.
+            limit_n: the guard's limit for one contact [N].
+            dt_s: time since the last sample [s].
         """
-        tick = self.tick
         wall = self.wall
-        law = self.law
         self.ledger.update(
-            tick.moved_m,
-            tick.applied_n,
+            self._moved_m,
+            self.applied_n,
             self._applied_spring_n,
-            wall.stored_j(tick.x_m, limit_n) if share > 0.0 else 0.0,
-            tick.in_contact,
-            law.state.damping_n_s_per_m if law.publishes_damping else 0.0,
-            tick.dt_s,
+            gain * wall.stored_j(self.x_m, limit_n),
+            self.in_contact,
+            self.damping_n_s_per_m,
+            dt_s,
         )
-        tick.applied_n = share * self.force_n
-        tick.applied_contact_n = share * tick.contact_n
-        self._applied_spring_n = share * wall.spring_n
+        contact_n = self._contact_n
+        if self.blending:
+            contact_n += self.force_n - self.requested_n  # so that what is left is the law's own part
+        tick = self.tick
+        tick.applied_n = self.applied_n = share * self.force_n
+        tick.applied_contact_n = self._applied_contact_n = share * contact_n
+        spring_n = wall.spring_n
+        self._applied_spring_n = gain * (spring_n if spring_n <= limit_n else limit_n)
+
+
+def _number(value: Any) -> float:
+    """A law's number as a plain float within bounds.
+
+    Raises:
+        ArithmeticError: NaN, infinite or beyond all bounds.
+        TypeError: not a number.
+    """
+    if value.__class__ is not float:
+        if not isinstance(value, int | float):
+            raise TypeError(f"{value!r} is not a number")
+        value = float(value)
+    if not -MOST < value < MOST:
+        raise ArithmeticError(f"{value} is not a possible number")
+    return value

@@ -63,15 +63,18 @@ def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
         ConfigError: scene or limits do not fit the device.
     """
     settings = config.config
-    return ControlTick(
-        settings.scene,
-        settings.velocity,
-        Guard(settings.safety, info),
-        info,
-        lambda: RunningLaw(config.law, config.params),
-        settings.loop.period_s,
-        settings.safety.ramp_s,
-    )
+    try:
+        return ControlTick(
+            settings.scene,
+            settings.velocity,
+            Guard(settings.safety, info),
+            info,
+            lambda: RunningLaw(config.law, config.params),
+            settings.loop.period_s,
+            settings.safety.ramp_s,
+        )
+    except ConfigError as error:
+        raise ConfigError(*(f"{config.path}: {problem}" for problem in error.problems)) from None
 
 
 def place_device(config: LoadedConfig, driver: Any) -> None:
@@ -130,9 +133,9 @@ def _serve(channel: socket.socket, parent_pid: int) -> int:
 
         signal.signal(signal.SIGTERM, stop)
         die_with_parent(parent_pid)
-        warnings = become_realtime(settings.loop)
+        problems, advice = become_realtime(settings.loop)
         shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
-        hello = {"info": asdict(info), "warnings": warnings, "pid": os.getpid()}
+        hello = {"info": asdict(info), "realtime": not problems, "warnings": problems + advice, "pid": os.getpid()}
         socket.send_fds(channel, [packed(hello)], [shared.descriptor])
     except BaseException:
         driver.close()

@@ -34,11 +34,12 @@ def die_with_parent(parent_pid: int) -> None:
         os.kill(os.getpid(), signal.SIGTERM)
 
 
-def become_realtime(config: LoopConfig) -> list[str]:
+def become_realtime(config: LoopConfig) -> tuple[list[str], list[str]]:
     """Lock memory, freeze the collector, hold the processor out of deep idle, and take SCHED_FIFO.
 
     Returns:
-        What could not be had, each with the grant that mends it; empty when all is well or nothing was asked for.
+        What keeps the loop from being a real-time one, each with the grant that mends it; and what only makes it
+        later than it need be.
 
     Raises:
         RealtimeError: `required`, and scheduling or locked memory could not be had.
@@ -47,7 +48,7 @@ def become_realtime(config: LoopConfig) -> list[str]:
     gc.freeze()
     gc.disable()
     if config.realtime == "off":
-        return ["realtime = off: the loop runs at normal priority"]
+        return ["loop.realtime = \"off\": the loop runs at normal priority"], []
     problems = []
     if _libc.mlockall(_MCL_CURRENT_AND_FUTURE):
         problems.append(
@@ -69,7 +70,7 @@ def become_realtime(config: LoopConfig) -> list[str]:
         _libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # else every sleep ends 50 us late
     if problems and config.realtime == "required":
         raise RealtimeError('loop.realtime = "required", but ' + "; ".join(problems))
-    return problems + advice
+    return problems, advice
 
 
 def make_sleeper() -> Callable[[int], None]:

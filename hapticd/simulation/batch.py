@@ -450,25 +450,34 @@ class Batch:
         Raises:
             PluginError: the law cannot be compiled.
         """
+        arrays = self.arrays()
+        self.run_on(arrays, workers, progress)
+        return self._result(arrays)
+
+    def arrays(self) -> Arrays:
+        """Every point as it is before its first tick."""
+        return Arrays(self._prepared, self._rows)
+
+    def run_on(self, arrays: Arrays, workers: int | None = None, progress: Callable[[int], None] | None = None) -> None:
+        """Run every point as machine code, from and into these arrays."""
         sweep = _machine_code(self.law, tuple(sorted(self._switches.items())))
-        arrays = _Arrays(self._prepared, self._rows)
+        count = len(self._prepared)
+        step = max(CHUNK, -(-count // 50)) if progress else count
         threads = get_num_threads()
         set_num_threads(min(workers or threads, threads))
         try:
-            step = max(CHUNK, -(-len(self._prepared) // 50)) if progress else len(self._prepared)
-            for first in range(0, len(self._prepared), step):
-                stop = min(first + step, len(self._prepared))
+            for first in range(0, count, step):
+                stop = min(first + step, count)
                 sweep(first, stop, *arrays.arguments())
                 if progress:
                     progress(stop)
         finally:
             set_num_threads(threads)
-        return self._result(arrays.loops, arrays.ledgers, arrays.law_states, arrays.traces)
 
     def run_interpreted(self) -> BatchResult:
         """Run every point as plain Python: the same numbers, about a hundred times slower."""
         loop = _bound(self._switches, self.law.step, EnergyLedger.update)
-        arrays = _Arrays(self._prepared, self._rows)
+        arrays = Arrays(self._prepared, self._rows)
         for at, one in enumerate(self._prepared):
             plant = _plain(one.plant)
             state = _plain(one.loop)
@@ -491,9 +500,10 @@ class Batch:
             _store(arrays.loops[at], state)
             _store(arrays.ledgers[at], ledger)
             _store(arrays.law_states[at], law_state)
-        return self._result(arrays.loops, arrays.ledgers, arrays.law_states, arrays.traces)
+        return self._result(arrays)
 
-    def _result(self, loops: Any, ledgers: Any, law_states: Any, traces: Any) -> BatchResult:
+    def _result(self, arrays: Arrays) -> BatchResult:
+        loops, ledgers = arrays.loops, arrays.ledgers
         window = np.array([one.window for one in self._prepared], dtype=float)
         period_s = np.array([point.period_s for point in self.points])
         finite = loops["finite"].copy()
@@ -516,8 +526,8 @@ class Batch:
             settled_s=np.where(settled, (loops["outside_tick"] + 1) * period_s, np.nan),
             finite=finite,
             ticks=loops["ticks"].copy(),
-            states=law_states.copy(),
-            trace=traces,
+            states=arrays.law_states,
+            trace=arrays.traces,
         )
 
 
@@ -614,7 +624,7 @@ class _Prepared:
         return force.newton / spring if spring > 0.0 else math.nan
 
 
-class _Arrays:
+class Arrays:
     """All points as arrays of records, and what does not fit into records as one flat array each."""
 
     def __init__(self, prepared: Sequence[_Prepared], rows: int) -> None:
@@ -669,8 +679,10 @@ class _Arrays:
 
 def _bound(switches: Mapping[str, bool], step: Callable[..., Any], update: Callable[..., Any]) -> Callable[..., None]:
     """`run` with the terms, the law and the ledger that it needs."""
-    plant = {"move": specialise(move, switches), "sense": specialise(sense, switches)}
-    return specialise(run, switches, {**plant, "law_step": step, "ledger_update": update})
+    calls: dict[str, Callable[..., Any]] = {"law_step": step, "ledger_update": update}
+    calls["move"] = specialise(move, switches)
+    calls["sense"] = specialise(sense, switches)
+    return specialise(run, switches, calls)
 
 
 @lru_cache(maxsize=32)

@@ -15,7 +15,6 @@ from types import FunctionType, ModuleType
 from typing import Any, Literal
 
 import numpy as np
-from llvmlite import ir
 from numba import from_dtype, njit, types
 from numba.core import cgutils
 from numba.core.errors import NumbaError
@@ -100,18 +99,21 @@ def compiled_step(law: ModuleType) -> Any:
     return machine
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def on_stack(_typing: Any, record: Any) -> Any:
+def _on_stack(_typing: Any, record: Any) -> Any:
     """A copy of a record in the caller's frame."""
 
     def codegen(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        slot = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(8), record.size))
+        slot = _emit.alloca_once(builder, context.get_data_type(record))
         slot.align = 16
         size = context.get_constant(types.uintp, record.size)
-        cgutils.raw_memcpy(builder, slot, arguments[0], size, 1)
+        _emit.raw_memcpy(builder, slot, arguments[0], size, 1)
         return builder.bitcast(slot, arguments[0].type)
 
     return (record(record), codegen) if isinstance(record, types.Record) else None
+
+
+_emit: Any = cgutils  # numba publishes no types for these
+on_stack: Any = intrinsic(_on_stack)
 
 
 def _names(code: Any) -> set[str]:

@@ -22,6 +22,9 @@ from hapticd.control.shared import RECORDS, SUPERVISOR_BEAT, RecordReader, Share
 START_TIMEOUT_S = 30.0
 """How long the device may take to open before the start counts as failed [s]."""
 
+END_TIMEOUT_S = 1.0
+"""How long the loop may take to ramp its force out [s]."""
+
 STALL_S = 0.1
 """How long the loop may stand still before it is given up [s]; at least ten periods."""
 
@@ -34,7 +37,8 @@ class Control:
 
     Attributes:
         info: what the device declared.
-        warnings: what it could not have, for example real-time scheduling.
+        realtime: whether its scheduling and memory are as a loop needs them.
+        warnings: what it could not have, and who can grant it.
         shared: the memory shared with it.
         reader: its tick records.
 
@@ -66,6 +70,7 @@ class Control:
         info["axes"] = tuple(info["axes"])
         info["workspace_m"] = tuple(tuple(span) for span in info["workspace_m"])
         self.info = DeviceInfo(**info)
+        self.realtime: bool = hello["realtime"]
         self.warnings: list[str] = hello["warnings"]
         layout = RecordLayout(len(self.info.axes), self.info.has_orientation, MAX_WALLS)
         self.shared = SharedMemory(layout, config.config.loop.rate_hz, descriptor)
@@ -99,6 +104,15 @@ class Control:
         else:
             self._still_s += min(now_s - looked_s, 0.02)
         return self._still_s > self.stall_s
+
+    def end(self) -> None:
+        """Let the loop ramp its force out and end; kill it when it does not."""
+        with contextlib.suppress(ProcessLookupError):
+            self.process.terminate()
+        try:
+            self.process.wait(END_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
 
     def kill(self) -> None:
         """End the process at once, whatever it is doing."""

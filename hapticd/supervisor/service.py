@@ -53,7 +53,7 @@ class Service:
             undo.callback(self.lock.close)
             self.control = Control(config)
             undo.callback(self.control.close)
-            undo.callback(self.control.kill)
+            undo.callback(self.control.end)
             self.publisher = Publisher(
                 config.config.telemetry,
                 self.lock.directory / TELEMETRY,
@@ -288,7 +288,7 @@ class Service:
             wall_stiffness_n_per_m=tuple(wall.stiffness_n_per_m for wall in settings.scene.walls),
             config_file=str(self.config.path),
             config_hash=self.config.hash,
-            realtime=not self.control.warnings,
+            realtime=self.control.realtime,
             warnings=tuple(self.control.warnings),
         )
         self.publisher.status(status.as_map())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 from pathlib import Path
 
 from hapticd.contracts.errors import ConfigError, InstanceError
@@ -44,17 +45,18 @@ def make_runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
     """
     directory = runtime_directory(instance)
     shared = directory.is_relative_to(_temporary())
+    mode = 0o700 if shared else 0o755
     try:
-        directory.parent.mkdir(mode=0o700 if shared else 0o755, parents=True, exist_ok=True)
-        directory.mkdir(mode=0o700 if shared else 0o755, exist_ok=True)
+        directory.parent.mkdir(mode=mode, parents=True, exist_ok=True)
+        if shared and not _ours(directory.parent):
+            raise InstanceError(
+                f"{directory.parent}: belongs to somebody else; set HAPTICD_RUNTIME_DIR to one of yours"
+            )
+        directory.mkdir(mode=mode, exist_ok=True)
     except OSError as error:
         raise InstanceError(
             f"{directory}: cannot be made ({error.strerror}); set HAPTICD_RUNTIME_DIR to a directory of yours"
         ) from error
-    if shared and not _ours(_temporary()):
-        raise InstanceError(
-            f"{_temporary()}: belongs to somebody else; set HAPTICD_RUNTIME_DIR to a directory of yours"
-        )
     return directory
 
 
@@ -106,4 +108,4 @@ def _temporary() -> Path:
 
 def _ours(directory: Path) -> bool:
     status = directory.lstat()
-    return directory.is_dir() and not directory.is_symlink() and status.st_uid == os.geteuid()
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid()

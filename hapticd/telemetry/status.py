@@ -71,7 +71,7 @@ class Status:
         max_force_n: largest force that the guard lets through [N]; 0 when there is no limit.
         wall_axis: axis of each wall, in scene order.
         wall_position_m: where each wall is on its axis [m].
-        wall_stiffness_n_per_m: its stiffness now [N/m].
+        wall_stiffness_n_per_m: its stiffness as the file has it, before any change over time [N/m].
         config_file: the file that is in force.
         config_hash: of its content.
         realtime: scheduling and memory are as the loop needs them.

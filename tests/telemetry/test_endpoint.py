@@ -14,14 +14,17 @@ from hapticd.telemetry.endpoint import locate, make_runtime_directory, runtime_d
 
 @pytest.fixture
 def user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An ordinary user: no environment, /run and /tmp of its own, not root."""
+    """Nothing in the environment, and a /run and /tmp of our own."""
     for name in ("HAPTICD_RUNTIME_DIR", "RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(endpoint, "_SYSTEM", tmp_path / "run" / "hapticd")
     monkeypatch.setattr(endpoint, "_temporary", lambda: tmp_path / "tmp" / "hapticd-1000")
-    uid = os.geteuid()
-    monkeypatch.setattr(os, "geteuid", lambda: uid or 1000)
     return tmp_path
+
+
+@pytest.fixture
+def not_root(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
 
 
 def sockets_of(directory: Path) -> Path:
@@ -30,6 +33,7 @@ def sockets_of(directory: Path) -> Path:
     return directory / "telemetry"
 
 
+@pytest.mark.usefixtures("not_root")
 def test_the_environment_comes_first(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", "/session")
     assert runtime_directory("lab") == Path("/session/hapticd/lab")
@@ -51,12 +55,14 @@ def test_root_serves_the_system(user: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert runtime_directory() == user / "run" / "hapticd" / "default"
 
 
+@pytest.mark.usefixtures("not_root")
 def test_a_user_serves_the_session_or_else_below_tmp(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert runtime_directory() == user / "tmp" / "hapticd-1000" / "default"
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(user / "session"))
     assert runtime_directory() == user / "session" / "hapticd" / "default"
 
 
+@pytest.mark.usefixtures("not_root")
 def test_a_client_prefers_the_systems_daemon_then_the_users(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(user / "session"))
     assert locate("telemetry") == user / "session" / "hapticd" / "default" / "telemetry"
@@ -67,7 +73,8 @@ def test_a_client_prefers_the_systems_daemon_then_the_users(user: Path, monkeypa
     assert locate("telemetry", "other").parent.name == "other"
 
 
-def test_a_directory_is_made_once_and_below_tmp_for_its_user_alone(user: Path) -> None:
+def test_a_directory_is_made_once_and_below_tmp_for_its_user_alone(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "tmp" / "hapticd-1000"))
     (user / "tmp").mkdir()
     directory = make_runtime_directory("lab")
     assert directory == make_runtime_directory("lab")
@@ -75,7 +82,8 @@ def test_a_directory_is_made_once_and_below_tmp_for_its_user_alone(user: Path) -
     assert directory.stat().st_mode & 0o777 == 0o700
 
 
-def test_somebody_elses_directory_below_tmp_is_not_used(user: Path) -> None:
+def test_somebody_elses_directory_below_tmp_is_not_used(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "tmp" / "hapticd-1000"))
     (user / "elsewhere").mkdir()
     (user / "tmp").mkdir()
     (user / "tmp" / "hapticd-1000").symlink_to(user / "elsewhere")

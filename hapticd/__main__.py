@@ -1,0 +1,5 @@
+"""`python -m hapticd` is `hapticd`."""
+
+from hapticd.cli import main
+
+main()

@@ -1,0 +1,186 @@
+"""What compiled Python costs against C: the closed loop over a grid, the same arithmetic, results compared.
+
+    python -m hapticd.bench.batch [--points 1000] [--seconds 3] [--repeats 7] [--json]
+
+The C is batch_reference.c, built when this runs with `cc -O2 -ffp-contract=off`. All are measured in turns, so that
+whatever else the machine does strikes them alike; figures are the best turn of each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import get_num_threads
+
+from hapticd import registry
+from hapticd.config.models import WallConfig
+from hapticd.contracts.errors import HapticdError
+from hapticd.simulation.batch import Batch, Point
+from hapticd.simulation.options import SimulationOptions
+
+_C_TYPES = {"float64": "double", "int64": "int64_t", "bool": "bool"}
+_STRUCTS = {
+    "plant_state": "plants",
+    "plant_params": "epochs",
+    "loop_state": "loops",
+    "loop_params": "params",
+    "segment": "segments",
+    "law_state": "law_states",
+    "law_params": "law_params",
+    "law_tick": "ticks",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Throughput in million ticks a second, and the ratios that are compared between machines.
+
+    Attributes:
+        threads: threads of `all_cores`.
+        c_one_core, one_core, all_cores, interpreted: Mtick/s.
+        one_core_ratio, all_cores_ratio, interpreted_ratio: against C on one core.
+        equal: whether C and compiled Python ended in the same states, bit for bit.
+    """
+
+    threads: int
+    c_one_core: float
+    one_core: float
+    all_cores: float
+    interpreted: float
+    one_core_ratio: float
+    all_cores_ratio: float
+    interpreted_ratio: float
+    equal: bool
+
+
+def grid(points: int) -> list[Point]:
+    """Walls from 4 to 30 kN/m, struck from 0 to 8 mm and then pressed: some settle, some bounce at the force limit."""
+    law = registry.law("energy-cycle")
+    found = []
+    for at in range(points):
+        device = SimulationOptions.model_validate(
+            {
+                "initial_position_m": 0.001 * (at % 9),
+                "hand": {"force": {"profile": "constant", "newton": -1.0 - at % 7}},
+            }
+        )
+        wall = WallConfig(stiffness_n_per_m=4000.0 + 26000.0 * at / points)
+        found.append(Point(device, wall, law.Params(), max_force_n=12.0))
+    return found
+
+
+def measure(points: int, seconds: float, repeats: int) -> Figures:
+    """Measure all of them in turns.
+
+    Raises:
+        HapticdError: there is no C compiler.
+    """
+    law = registry.law("energy-cycle")
+    loops = grid(points)
+    batch = Batch(law, loops, seconds, ledger=False)
+    few = Batch(law, loops[:: max(1, points // 4)], min(seconds, 2.0), ledger=False)
+    with tempfile.TemporaryDirectory() as folder:
+        reference = Reference(batch, Path(folder))
+        batch.run(1)
+        ticks = sum(round(seconds / point.period_s) for point in loops)
+        few_ticks = sum(round(min(seconds, 2.0) / point.period_s) for point in few.points)
+        best = dict.fromkeys(("c", "one", "all", "plain"), 1e9)
+        for _ in range(repeats):
+            best["c"] = min(best["c"], reference.run())
+            best["one"] = min(best["one"], _kernel(batch, 1))
+            best["all"] = min(best["all"], _kernel(batch, None))
+            best["plain"] = min(best["plain"], _seconds(few.run_interpreted))
+        equal = reference.agrees_with(batch)
+    c, one, both = (ticks / best[name] * 1e-6 for name in ("c", "one", "all"))
+    plain = few_ticks / best["plain"] * 1e-6
+    return Figures(get_num_threads(), c, one, both, plain, one / c, both / c, plain / c, equal)
+
+
+class Reference:
+    """The loop in C over the records of a batch."""
+
+    def __init__(self, batch: Batch, folder: Path) -> None:
+        compiler = shutil.which("cc")
+        if compiler is None:
+            raise HapticdError("no C compiler `cc` here; install gcc or clang")
+        self._batch = batch
+        arrays = batch.arrays()
+        header = [_struct(name, getattr(arrays, field).dtype) for name, field in _STRUCTS.items()]
+        (folder / "batch_types.h").write_text("\n".join(header))
+        source = Path(__file__).with_name("batch_reference.c")
+        library = folder / "batch_reference.so"
+        command = [compiler, "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-I{folder}", str(source)]
+        subprocess.run([*command, "-o", str(library), "-lm"], check=True)
+        self._sweep = ctypes.CDLL(str(library)).sweep
+        self._arrays = arrays
+
+    def run(self) -> float:
+        """Run once.  -> seconds that it took."""
+        self._arrays = arrays = self._batch.arrays()
+        pointers = [ctypes.c_void_p(getattr(arrays, field).ctypes.data) for field in _STRUCTS.values()]
+        count = ctypes.c_int64(len(self._batch.points))
+        return _seconds(lambda: self._sweep(ctypes.c_int64(0), count, *pointers))
+
+    def agrees_with(self, batch: Batch) -> bool:
+        """Whether the last run ended in the same states as compiled Python does."""
+        arrays = batch.arrays()
+        batch.run_on(arrays, 1)
+        pairs = ((arrays.loops, self._arrays.loops), (arrays.law_states, self._arrays.law_states))
+        return all(np.array_equal(ours[name], theirs[name]) for ours, theirs in pairs for name in ours.dtype.names)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, default=3.0, help="simulated seconds a point")
+    parser.add_argument("--repeats", type=int, default=7)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args(arguments)
+    figures = measure(options.points, options.seconds, options.repeats)
+    if options.json:
+        print(json.dumps(asdict(figures)))  # noqa: T201 - a command's output
+    else:
+        rows = [
+            ("C -O2, one core", figures.c_one_core, 1.0),
+            ("compiled Python, one core", figures.one_core, figures.one_core_ratio),
+            (f"compiled Python, {figures.threads} threads", figures.all_cores, figures.all_cores_ratio),
+            ("interpreted", figures.interpreted, figures.interpreted_ratio),
+        ]
+        for name, rate, ratio in rows:
+            print(f"{name:32} {rate:9.3f} Mtick/s   {ratio:6.3f} of C")  # noqa: T201
+        print(f"same results to the last bit: {figures.equal}")  # noqa: T201
+    return 0 if figures.equal else 1
+
+
+def _struct(name: str, dtype: np.dtype[Any]) -> str:
+    assert dtype.names is not None
+    fields = " ".join(f"{_C_TYPES[dtype[field].name]} {field};" for field in dtype.names)
+    return f"typedef struct {{ {fields} }} {name};"
+
+
+def _kernel(batch: Batch, workers: int | None) -> float:
+    arrays = batch.arrays()
+    return _seconds(lambda: batch.run_on(arrays, workers))
+
+
+def _seconds(function: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    function()
+    return time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    sys.exit(main())

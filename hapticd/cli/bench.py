@@ -1,0 +1,293 @@
+"""`hapticd bench`: what parts of the service cost on this machine, next to a reference measured in the same run."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from hapticd import bench
+from hapticd.contracts.errors import HapticdError
+from hapticd.telemetry.status import LATE_EDGES_US
+
+app = typer.Typer(
+    help="Measure what the service costs on this machine, next to a reference measured in the same run.",
+    epilog="Example: hapticd bench tick    What the figures mean: docs/benchmarks.md",
+    rich_markup_mode=None,
+)
+
+_JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+_COLOURS = {"PASS": "green", "FAIL": "red", "INCONCLUSIVE": "yellow"}
+_WIDTH = 130  # of tables that go into a file
+_FORWARD = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+
+
+@app.callback(invoke_without_command=True)
+def overview(context: typer.Context) -> None:
+    """List the benchmarks."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command()
+def tick(
+    ticks: Annotated[int, typer.Option(min=100, help="Ticks of each case, paced at 1 kHz and as many hot.")] = 4000,
+    duration: Annotated[
+        float, typer.Option(min=0.0, help="How long each real daemon runs [s]; 0 leaves them out.")
+    ] = 5.0,
+    rate: Annotated[
+        list[float] | None,
+        typer.Option(help="Rate of a real daemon [Hz], repeatable; 1000, 4000 and 8000 when not given."),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="100 ticks a case and no daemons: shows that it works.")
+    ] = False,
+    as_json: _JSON = False,
+) -> None:
+    """Measure what a tick costs, and how many of them a daemon runs.
+
+    For every installed law, every kind of shipped configuration, scenes of 0 to 8 walls and the pieces of the tick.
+    Runs under SCHED_FIFO with memory locked when it may. Target: p99 of a tick body at most 3 % of the period at 1 kHz.
+
+    Example: hapticd bench tick --duration 60
+    """
+    from hapticd.bench import tick as measured
+
+    rounds = measured.ROUNDS
+    rates_hz = tuple(rate or (1000.0, 4000.0, 8000.0))
+    if quick:
+        ticks, rounds, duration = 100, 1, 0.0
+    with _progress(measured.duration_s(ticks, len(rates_hz), duration)) as progress:
+        report = measured.measure(ticks, rounds, rates_hz, duration, progress)
+    if as_json:
+        typer.echo(json.dumps(asdict(report), indent=2))
+        return
+    console = _console()
+    for warning in report.warnings:
+        console.print(f"[yellow]not real-time:[/] {escape(warning)}")
+    table = _table(
+        console,
+        "Body of a tick at 1 kHz [us]; ratios to the arithmetic in the same run",
+        *(
+            "case",
+            "p50",
+            "p99",
+            "p99.9",
+            "max",
+            "p99 / period",
+            "p50 ratio",
+            "p99 ratio",
+            "hot p50",
+            "hot p99",
+            "hot ratio",
+        ),
+    )
+    for body in report.bodies:
+        name = escape(f"{body.group} {body.name}")
+        if body.problem:
+            table.add_row(name, f"[red]{escape(body.problem)}[/]")
+            continue
+        table.add_row(
+            name,
+            *_quantiles(body.paced_us),
+            f"{body.of_period:.2%}",
+            *(f"{value:.2f}" for value in (body.p50_ratio, body.p99_ratio)),
+            *(f"{value:.1f}" for value in (body.hot_us.p50, body.hot_us.p99)),
+            f"{body.hot_ratio:.2f}",
+        )
+    _show(console, table)
+    table = _table(
+        console,
+        "Pieces of it, energy-cycle on one wall, each with the cost of timing it [us]",
+        *("piece", "p50", "p99", "p99.9", "max", "p50 without timing", "ratio"),
+    )
+    for piece in report.pieces:
+        table.add_row(piece.name, *_quantiles(piece.us), f"{piece.p50_net_us:.1f}", f"{piece.p50_ratio:.2f}")
+    _show(console, table)
+    if report.rates:
+        _rates(console, report.rates)
+    for ran in report.rates:
+        if ran.fault:
+            console.print(f"[red]{ran.rate_hz:g} Hz: the loop stopped: {escape(ran.fault)}[/]")
+        console.print(f"{ran.rate_hz:g} Hz, ticks by lateness: {_histogram(ran.late_histogram)}")
+    _verdicts(console, report.bars, report.conditions)
+
+
+@app.command()
+def lateness(
+    blocks: Annotated[int, typer.Option(min=1, help="Blocks of each cell, in random order.")] = 4,
+    block: Annotated[float, typer.Option(min=0.5, help="Length of a block [s].")] = 5.0,
+    cpu: Annotated[
+        int | None, typer.Option(min=0, help="Processor to measure on; the last one when not given.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the order of the blocks.")] = None,
+    control: Annotated[bool, typer.Option(help="Measure the thread layout too, which has to fail.")] = True,
+    quick: Annotated[bool, typer.Option("--quick", help="One block of 2 s a cell: too short to judge p99.9.")] = False,
+    as_json: _JSON = False,
+) -> None:
+    """Measure how late the loop wakes beyond what the machine does to any loop.
+
+    A witness in C sleeps to the same deadlines on the same processor at a higher priority; what the loop is later than
+    its witness is its own. Judged against the same C program in the place of the loop, idle and beside two programs
+    that compute. Needs SCHED_FIFO, locked memory and a C compiler.
+
+    Example: hapticd bench lateness --blocks 8
+    """
+    from hapticd.bench import lateness as measured
+
+    if quick:
+        blocks, block = 1, 2.0
+    with _progress(len(measured.plan(blocks, control)) * block) as progress:
+        report = measured.measure(blocks, block, control, cpu, seed, progress)
+    if as_json:
+        typer.echo(json.dumps(asdict(report), indent=2))
+        return
+    console = _console()
+    table = _table(
+        console,
+        f"Excess over the witness at 1 kHz [us], processor {report.cpu}, {report.blocks} x {report.block_s:g} s a cell",
+        *("loop", "load", "joined", "skipped", "p50", "p99", "p99.9", "max", "> 200 us"),
+        *("witness p99.9", "witness > 200 us", "witness skipped"),
+    )
+    for cell in report.cells:
+        table.add_row(
+            cell.loop,
+            cell.load,
+            *(str(cell.joined), str(cell.loop_skipped)),
+            *_quantiles(cell.excess_us),
+            f"{cell.excess_late:.2%}",
+            f"{cell.witness_us.p999:.1f}",
+            f"{cell.witness_late:.2%}",
+            str(cell.witness_skipped),
+        )
+    _show(console, table)
+    table = _table(
+        console,
+        "Lateness itself, and bodies of the loop's ticks [us]",
+        *("loop", "load", "p50", "p99", "p99.9", "max", "> 1 ms", "body p50", "body p99", "body p99.9"),
+    )
+    for cell in report.cells:
+        body = [f"{value:.1f}" for value in (cell.busy_us.p50, cell.busy_us.p99, cell.busy_us.p999)]
+        table.add_row(
+            *(cell.loop, cell.load),
+            *_quantiles(cell.late_us),
+            str(cell.loop_over_1ms),
+            *(body if cell.busy_us.count else ()),
+        )
+    _show(console, table)
+    if report.thread_bars:
+        console.print("The thread layout, which has to miss some of these:")
+        _bars(console, report.thread_bars)
+        console.print()
+    _verdicts(console, report.bars, report.conditions)
+
+
+@app.command(context_settings=_FORWARD)
+def telemetry(context: typer.Context) -> None:
+    """Measure what publishing costs, with 0, 1 and 16 subscribers.
+
+    Example: hapticd bench telemetry --seconds 10 --json
+    """
+    raise typer.Exit(_forward("telemetry", context.args))
+
+
+@app.command(context_settings=_FORWARD)
+def batch(context: typer.Context) -> None:
+    """Measure the offline simulator next to the same computation in C.
+
+    Example: hapticd bench batch --json
+    """
+    raise typer.Exit(_forward("batch", context.args))
+
+
+def _forward(name: str, arguments: Sequence[str]) -> int:
+    """Hand the rest of the command line to a benchmark that reads it itself."""
+    if importlib.util.find_spec(f"hapticd.bench.{name}") is None:
+        raise HapticdError(f"bench {name}: this installation does not have it")
+    try:
+        status = importlib.import_module(f"hapticd.bench.{name}").main(list(arguments))
+    except SystemExit as stop:  # of its own reading of the command line
+        status = stop.code
+    return status if isinstance(status, int) else 0
+
+
+@contextmanager
+def _progress(total_s: float) -> Iterator[bench.Progress]:
+    columns = (TextColumn("measuring"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task("", total=total_s)
+        yield lambda seconds: shown.advance(task, seconds)
+
+
+def _console() -> Console:
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=_WIDTH)
+
+
+def _table(console: Console, title: str, *columns: str) -> Table:
+    """Print the title and begin the table that goes under it."""
+    console.print(f"[bold]{escape(title)}[/]", soft_wrap=True)
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
+    return table
+
+
+def _show(console: Console, table: Table) -> None:
+    console.print(table)
+    console.print()
+
+
+def _quantiles(values: bench.Quantiles) -> list[str]:
+    return [f"{value:.1f}" for value in (values.p50, values.p99, values.p999, values.max)]
+
+
+def _rates(console: Console, rates: Sequence[Any]) -> None:
+    table = _table(
+        console,
+        "Real daemons: lateness and bodies of their ticks [us]",
+        *("rate", "sustained", "ticks", "skipped", "not fetched", "late p50", "p99", "p99.9", "max", "body p50", "p99"),
+    )
+    for ran in rates:
+        table.add_row(
+            f"{ran.rate_hz:g} Hz",
+            f"{ran.sustained_hz:.1f} Hz",
+            *(str(count) for count in (ran.ticks, ran.skipped, ran.dropped)),
+            *_quantiles(ran.late_us),
+            *(f"{value:.1f}" for value in (ran.busy_us.p50, ran.busy_us.p99)),
+        )
+    _show(console, table)
+
+
+def _histogram(counts: Sequence[int]) -> str:
+    edges = [f"< {edge}" for edge in LATE_EDGES_US] + [f">= {LATE_EDGES_US[-1]}"]
+    return ", ".join(f"{edge} us: {count}" for edge, count in zip(edges, counts, strict=True) if count)
+
+
+def _verdicts(console: Console, bars: Sequence[bench.Bar], conditions: bench.Conditions) -> None:
+    _bars(console, bars)
+    console.print(
+        f"\n{escape(conditions.machine)}, Linux {escape(conditions.kernel)}, Python {conditions.python}; "
+        f"{conditions.seconds:.0f} s, load {conditions.load_before:.2f} to {conditions.load_after:.2f}, other programs "
+        f"kept {conditions.others:.2f} processors busy, {conditions.stolen:.3f} stolen by the host",
+        soft_wrap=True,
+    )
+
+
+def _bars(console: Console, bars: Sequence[bench.Bar]) -> None:
+    for bar in bars:
+        note = f"  ({escape(bar.note)})" if bar.note else ""
+        verdict = f"[{_COLOURS[bar.verdict]}]{bar.verdict:12}[/]"
+        console.print(
+            f"{verdict} {escape(bar.name)}: {bar.measured:.4g}, at most {bar.limit:.4g}{note}", soft_wrap=True
+        )
