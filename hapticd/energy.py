@@ -24,7 +24,8 @@ def cycle_ended(state: Any, energy_j: float, in_contact: bool, past: int, future
         ... E(t-2) > E(t-1) > E(t) < E(t+1) < E(t+2) ...      `past` strict falls, then `future` strict rises
 
     Equal samples are skipped: with a quantised position E often repeats, and a literal reading would then see no
-    cycle at all. A lost contact ends the cycle at once, since E stays flat outside the wall and never rises again.
+    cycle at all. A lost contact ends the cycle at once, since E stays flat outside the wall: the rises that are still
+    to come then never do, and a damper that pulls in the last sample inside has often made the first of them.
 
     Args:
         state: an object with the fields of `CycleFields`.
@@ -51,8 +52,9 @@ def cycle_ended(state: Any, energy_j: float, in_contact: bool, past: int, future
             ended = True
         state.window_energy_j = energy_j
     if not in_contact:
-        if state.window_falls >= past and state.window_rises == 0:
-            state.window_minimum_j = state.window_energy_j
+        if state.window_falls >= past and state.window_rises < future:
+            if state.window_rises == 0:
+                state.window_minimum_j = state.window_energy_j
             ended = True
         state.window_falls = 0
         state.window_rises = 0
@@ -78,7 +80,8 @@ class EnergyLedger:
         generated_j: energy made by sampling and hold [J], never falls.
         debt_j: what this contact has given beyond what it took since it was touched [J], >= 0.
         cycle: completed cycles, by the 2+2 window whatever the law uses.
-        cycle_energy_j, cycle_generated_j, cycle_damping_n_s_per_m, cycle_duration_s: of the last completed cycle.
+        cycle_energy_j, cycle_generated_j, cycle_damping_n_s_per_m: of the last completed cycle.
+        cycle_duration_s: how long it took, from the touch or the end of the cycle before [s].
     """
 
     __slots__ = (
@@ -167,3 +170,12 @@ class EnergyLedger:
             self.cycle_damping_n_s_per_m = damping_n_s_per_m
             self.cycle_duration_s = self._cycle_s
             self._cycle_s = 0.0
+        elif not in_contact:
+            self._cycle_s = 0.0
+
+    def absorb(self, other: EnergyLedger) -> None:
+        """Add the totals of a contact that is gone, so that sums over all contacts do not jump."""
+        self.energy_j += other.energy_j
+        self.stored_j += other.stored_j
+        self.dissipated_j += other.dissipated_j
+        self.generated_j += other.generated_j

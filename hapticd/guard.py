@@ -71,9 +71,9 @@ def blended(state: Any, x_m: float, force_n: float) -> float:
         x_m: position relative to the wall, < 0 [m].
         force_n: the new force [N].
     """
-    weight = state.blend_tick / state.blend_ticks
+    weight: float = state.blend_tick / state.blend_ticks
     state.blend_tick += 1.0
-    reach_n = state.blend_limit_n
+    reach_n: float = state.blend_limit_n
     if weight >= 1.0:
         if weight >= 2.0 or -reach_n <= force_n <= reach_n:
             state.blending = False
@@ -120,11 +120,11 @@ class Guard:
     """
 
     __slots__ = (
+        "_axis_goal_n",
+        "_axis_rate",
         "_changing",
         "_force_goal_n",
         "_force_rate",
-        "_goal_axis_n",
-        "_axis_rate",
         "_max_squared",
         "_ramp_s",
         "gain",
@@ -218,18 +218,19 @@ class Guard:
             if newton > max_axis_n or newton < -max_axis_n:
                 share = min(share, max_axis_n / abs(newton))
         if not squared <= self._max_squared:  # true for NaN as well
-            if not squared < math.inf:
+            if squared < math.inf:
+                share = min(share, self.max_force_n / math.sqrt(squared))
+            else:
                 self.latched = True
                 self.drop()
-            share = min(share, self.max_force_n / math.sqrt(squared))
         self.limited = share < 1.0
         if self.mode is not Mode.ARMED:
-            share *= self.gain
-            if share == 0.0:
+            if self.mode is Mode.DISARMED:
+                self.limited = False
                 for axis in range(len(force_n)):
                     force_n[axis] = 0.0
-                self.limited = False
                 return 0.0
+            share *= self.gain
         if share != 1.0:
             for axis in range(len(force_n)):
                 force_n[axis] *= share
@@ -237,7 +238,7 @@ class Guard:
 
     def _aim(self, goal_n: float, goal_axis_n: float, ramp_s: float) -> None:
         self._force_goal_n = goal_n
-        self._goal_axis_n = goal_axis_n
+        self._axis_goal_n = goal_axis_n
         self._force_rate = _rate(self.max_force_n, goal_n, ramp_s)
         self._axis_rate = _rate(self.max_axis_n, goal_axis_n, ramp_s)
         self._take_limits()
@@ -253,8 +254,8 @@ class Guard:
         if self.max_force_n != self._force_goal_n:
             self.max_force_n = _towards(self.max_force_n, self._force_goal_n, self._force_rate * dt_s)
             moving = True
-        if self.max_axis_n != self._goal_axis_n:
-            self.max_axis_n = _towards(self.max_axis_n, self._goal_axis_n, self._axis_rate * dt_s)
+        if self.max_axis_n != self._axis_goal_n:
+            self.max_axis_n = _towards(self.max_axis_n, self._axis_goal_n, self._axis_rate * dt_s)
             moving = True
         if moving:
             self._take_limits()

@@ -18,7 +18,10 @@ class Estimator(Protocol):
         """Forget the past: the axis stands at this position."""
 
     def update(self, position_m: float, dt_s: float, device_m_per_s: float) -> float:
-        """Velocity now [m/s], from the new position, the time since the last one and the device's own velocity."""
+        """Velocity now [m/s], from the new position, the time since the last one and the device's own velocity.
+
+        The time is 0 where it stood still, else a nanosecond or more.
+        """
 
 
 def make_estimator(config: VelocityConfig, resolution_m: float) -> Estimator:
@@ -148,10 +151,13 @@ class LowPass:
 
 
 class AdaptiveWindow:
-    """First-order adaptive windowing, end-fit: the longest window whose straight line misses no sample by more than the noise.
+    """First-order adaptive windowing, end-fit: the longest window whose line misses no sample by more than the noise.
 
     Janabi-Sharifi, Hayward and Chen, "Discrete-time adaptive windowing for velocity estimation", IEEE T-CST 8(6),
     2000. The bound is one full count, since both end points may be off by half of one.
+
+    Every sample that a window spans allows the line through the newest one a range of slopes; a window may be longer
+    by one as long as its own slope is in the range that all samples inside it leave. One pass over the samples does.
 
     Args:
         samples: longest window.
@@ -176,22 +182,19 @@ class AdaptiveWindow:
         history = self._history
         history.push(position_m, dt_s)
         now_s = history.time_s[history.newest]
+        lowest = -math.inf
+        highest = math.inf
         for length in range(1, history.filled):
-            start = (history.newest - length) % history.size
-            slope = (position_m - history.position_m[start]) / (now_s - history.time_s[start])
-            if length > 1 and not self._fits(position_m, now_s, slope, length):
+            at = history.newest - length  # a negative index counts from the end, as the ring does
+            span_s = now_s - history.time_s[at]
+            slope = (position_m - history.position_m[at]) / span_s
+            if not lowest <= slope <= highest:
                 break
             self._velocity_m_per_s = slope
+            room = self._noise_m / span_s
+            lowest = max(lowest, slope - room)
+            highest = min(highest, slope + room)
         return self._velocity_m_per_s
-
-    def _fits(self, position_m: float, now_s: float, slope: float, length: int) -> bool:
-        history = self._history
-        for back in range(1, length):
-            at = (history.newest - back) % history.size
-            line_m = position_m - slope * (now_s - history.time_s[at])
-            if abs(history.position_m[at] - line_m) > self._noise_m:
-                return False
-        return True
 
 
 class DeviceVelocity:

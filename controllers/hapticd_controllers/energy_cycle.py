@@ -1,8 +1,8 @@
 """Energy cycles with adaptive damping.
 
-"Relaxing Conservatism for Enhanced Impedance Range and Transparency in Haptic Interaction", eqs. 7-10: the wall may
-generate energy during one press and release; what it generated is measured at the end of that cycle and becomes
-damping for the next one. Every reading that the print leaves open is a parameter (docs/controllers.md).
+"Relaxing Conservatism for Enhanced Impedance Range and Transparency in Haptic Interaction", eqs. 7-10: the wall
+may generate energy during one press and release; what it generated is measured at the end of that cycle and
+becomes damping for the next. Every reading that the print leaves open is a parameter (docs/controllers.md).
 """
 
 from __future__ import annotations
@@ -16,37 +16,38 @@ from hapticd.energy import CycleFields, cycle_ended
 
 WORK_SPRING, WORK_TOTAL = range(2)
 PAIRING_EXACT, PAIRING_NEW_FORCE, PAIRING_POWER, PAIRING_HELD_POWER = range(4)
+FORCE_DELAY_IDENTIFIED, FORCE_DELAY_NONE, FORCE_DELAY_ONE_SAMPLE = range(3)
 SUM_CYCLE, SUM_START = range(2)
 RULE_SIGNED, RULE_NON_NEGATIVE, RULE_NON_DECREASING = range(3)
 PLATEAUS_SKIPPED, PLATEAUS_LITERAL = range(2)
 CONTACT_LOSS_ENDS_CYCLE, CONTACT_LOSS_IGNORED = range(2)
 NEW_CONTACT_KEEP, NEW_CONTACT_ENERGY, NEW_CONTACT_DAMPING = range(3)
-STORED_KEPT, STORED_SUBTRACTED = range(2)
+STORED_ENERGY_KEPT, STORED_ENERGY_SUBTRACTED = range(2)
 CAP_FELT_MASS, CAP_KNOWN_MASS, CAP_FIXED, CAP_NONE = range(4)
 
-LIMIT = 1e12
-"""No energy [J], damping [N s/m], speed [m/s] or damping force [N] grows beyond this: nothing ever overflows."""
-TINY_SUM = 1e-24
-"""Less motion than this in a cycle, sum of v^2 dt [m^2/s], is rest: there is nothing to divide by."""
-FELT_SAMPLES = 20.0
-"""Effective samples before an identified mass is believed."""
-FELT_COUNTS = 2.0
-"""Moves of so few counts of the position say more about the quantiser than about the mass."""
+LIMIT = 1e12  # nothing that is summed or returned grows beyond this, in SI units: so nothing overflows
+TINY_MOTION = 1e-24  # a cycle with less sum of v^2 dt [m^2/s] is rest: there is nothing to divide by
+FELT_SAMPLES = 20.0  # effective samples before an identified mass is believed
+FELT_COUNTS = 2.0  # a shorter move, in counts of the position, says more about the quantiser than about the mass
 
 
 class Params(LawParams):
     """How to read eqs. 7-10, and what bounds the damping."""
 
     window: int = Field(
-        2, ge=1, le=100, description="samples of falling, then of rising energy around a cycle's end; 1: a plain minimum"
+        2, ge=1, le=100, description="samples of falling, then of rising energy at a cycle's end; 1: a plain minimum"
     )
-    window_future: int = Field(0, ge=0, le=100, description="rising samples, where other than `window`; 0: the same")
+    window_future: int = Field(
+        0, ge=0, le=100, description="rising samples, where they should differ from `window`; 0: as many"
+    )
     work: Literal["spring", "total"] = Field(
         "spring", description="force in the energy: without the adaptive damping term, or the complete one"
     )
     pairing: Literal["exact", "new-force", "power", "held-power"] = Field(
-        "exact",
-        description="energy of a sample: F(n-1)(x(n)-x(n-1)), F(n)(x(n)-x(n-1)), F(n)v(n)dt, or F(n-1)v(n)dt",
+        "exact", description="energy of a sample: F(n-1) dx(n), F(n) dx(n), F(n) v(n) dt or F(n-1) v(n) dt"
+    )
+    force_delay: Literal["identified", "none", "one-sample"] = Field(
+        "identified", description="how late the device applies a force; F(n-2) dx(n) is exact where it is one sample"
     )
     sum: Literal["cycle", "start"] = Field(
         "cycle", description="v^2 dt in eq. 8 summed over the cycle, or from the start of contact history"
@@ -55,155 +56,176 @@ class Params(LawParams):
         "non-decreasing", description="what the damping of eq. 8 may do from cycle to cycle"
     )
     plateaus: Literal["skipped", "literal"] = Field(
-        "skipped", description="equal energies in eq. 10 are passed over, or break the window as printed"
+        "skipped", description="equal energies in eq. 10: passed over, or breaking the window as printed"
     )
     contact_loss: Literal["ends-cycle", "ignored"] = Field(
-        "ends-cycle", description="leaving the wall completes a release, or waits until the energy rises again"
+        "ends-cycle", description="leaving the wall: completes a release, or waits until the energy rises again"
     )
     new_contact: Literal["keep", "energy", "damping"] = Field(
-        "keep", description="forgotten when the wall is touched again: nothing, the energy and its sums, the damping too"
+        "keep", description="forgotten at a new touch: nothing, the energy and its sums, or the damping as well"
     )
     stored_energy: Literal["kept", "subtracted"] = Field(
-        "kept", description="what the spring holds at a cycle's end stays in eq. 7, or is taken out"
+        "kept", description="what the spring holds at a cycle's end: stays in eq. 7, or is taken out"
     )
     min_travel_counts: float = Field(
         0.0, ge=0.0, le=1e6, description="a cycle that travels less, in counts of the position, changes nothing"
     )
-    cap: Literal["felt-mass", "known-mass", "fixed", "none"] = Field(
-        "felt-mass", description="what bounds the damping: cap_share m/dt with m identified or given, a number, nothing"
+    small_travel_counts: float = Field(
+        10.0, ge=0.0, le=1e6, description="a cycle that travels less, in counts, is noise as much as motion"
     )
-    cap_share: float = Field(0.41, gt=0.0, le=2.0, description="damping at most this share of mass / dt")
+    small_leaks: float = Field(
+        4.0, ge=0.0, le=1e6, description="damping at most so many times what the spring leaked in a small cycle; 0: any"
+    )
+    cap: Literal["felt-mass", "known-mass", "fixed", "none"] = Field(
+        "felt-mass", description="bound of the damping: from the mass identified, the mass given, a number, nothing"
+    )
+    cap_share: float = Field(0.6, gt=0.0, le=2.0, description="the cap from a mass, as a share of mass / dt")
+    late_cap_share: float = Field(
+        0.35, gt=0.0, le=2.0, description="the same where the device applies forces one sample late"
+    )
     cap_damping_n_s_per_m: float = Field(
-        20.0, gt=0.0, le=1e9, description="the fixed cap; for felt-mass the cap until the mass is known [N s/m]"
+        50.0, gt=0.0, le=1e9, description="the fixed cap; for felt-mass the cap until the mass is known [N s/m]"
     )
     mass_kg: float = Field(0.25, gt=0.0, le=1e3, description="mass for the cap known-mass [kg]")
     felt_mass_memory: float = Field(
-        0.998, gt=0.0, le=1.0, description="share of the felt mass's evidence that a new sample leaves standing"
+        0.998, ge=0.5, le=1.0, description="share of the felt mass's evidence that a new sample leaves standing"
     )
-    wall_may_pull: bool = Field(True, description="whether damping may pull the device into the wall as it leaves")
+    wall_may_pull: bool = Field(True, description="whether damping may pull the device back while it leaves the wall")
 
 
 class State(CycleFields):
-    """What one contact remembers: cycle detector, energy, damping, and the motion that the felt mass comes from."""
+    """What is remembered of one wall: cycle detector, energy, damping, and the evidence for mass and delay."""
 
     damping_n_s_per_m: float  # alpha, in force until the next cycle ends
-    felt_mass_kg: float  # identified mass; 0 while unknown
+    felt_mass_kg: float  # what the wall's force accelerates; 0 while unknown
+    forces_late: bool  # whether the device applies a force one sample late
     energy_j: float  # into the wall since the end of the last cycle
     motion_m2_per_s: float  # sum of v^2 dt in contact
     candidate_motion_m2_per_s: float  # the same at the detector's candidate
     candidate_stored_j: float  # what the spring held at the candidate
     stored_j: float  # what the spring held at the end of the last cycle
-    lowest_m: float  # deepest position of this cycle
-    highest_m: float  # highest position of this cycle, in contact
+    lowest_m: float  # deepest position since the end of the last cycle
+    highest_m: float  # highest position in contact since then
     was_in_contact: bool
-    # the felt mass: sums of u, w, u^2, u w with forgetting
+    period_s: float  # dt, smoothed: one overrun is not another sampling rate
     last_moved_m: float
     last_dt_s: float
-    last_applied_n: float
-    count: float
-    sum_u: float
-    sum_w: float
+    last_work_n: float  # the force that went into the energy, one sample ago
+    last_applied_n: float  # F(n-2)
+    older_applied_n: float  # F(n-3)
+    count: float  # effective samples in the sums below, which forget
+    sum_w: float  # w: change of mean speed
+    sum_u: float  # u: impulse, forces in time
     sum_uu: float
     sum_uw: float
+    late_sum_u: float  # the same, forces one sample late
+    late_sum_uu: float
+    late_sum_uw: float
 
 
 def start(state: Any, params: Any, snapshot: Any) -> None:
-    """Take over: the damping that was reached, and the energy that nobody has dissipated, count for the next cycle."""
-    state.energy_j = _bounded(-snapshot.debt_j)
-    if state.energy_j > 0.0:
-        state.energy_j = 0.0
-    state.window_energy_j = state.energy_j
-    state.window_minimum_j = 0.0
-    state.window_falls = 0
-    state.window_rises = 0
+    """Take over: damping that was reached and energy that nobody dissipated count; a credit does not."""
+    state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
     state.felt_mass_kg = 0.0
-    state.damping_n_s_per_m = _bounded(snapshot.damping_n_s_per_m)
-    if state.damping_n_s_per_m < 0.0:
-        state.damping_n_s_per_m = 0.0
-    state.motion_m2_per_s = 0.0
-    state.candidate_motion_m2_per_s = 0.0
-    state.candidate_stored_j = 0.0
-    state.stored_j = 0.0
+    state.forces_late = params.force_delay == FORCE_DELAY_ONE_SAMPLE
+    state.was_in_contact = False
     state.lowest_m = snapshot.x_m
     state.highest_m = snapshot.x_m
-    state.was_in_contact = False
+    _begin(state, min(0.0, -_bounded(snapshot.debt_j)))
+    state.period_s = 0.0
     state.last_moved_m = 0.0
     state.last_dt_s = 0.0
+    state.last_work_n = 0.0
     state.last_applied_n = 0.0
+    state.older_applied_n = 0.0
     state.count = 0.0
-    state.sum_u = 0.0
     state.sum_w = 0.0
+    state.sum_u = 0.0
     state.sum_uu = 0.0
     state.sum_uw = 0.0
+    state.late_sum_u = 0.0
+    state.late_sum_uu = 0.0
+    state.late_sum_uw = 0.0
 
 
 def step(state: Any, params: Any, tick: Any) -> float:
-    """The contact's own force plus the damping that the last cycles called for.  -> force on the device [N]."""
-    velocity = _bounded(tick.velocity_m_per_s)
-    if params.cap == CAP_FELT_MASS:
-        feel_mass(state, params, tick)
+    """The contact's own force plus the damping that past cycles called for.  -> force on the device [N]."""
+    if params.cap == CAP_FELT_MASS or params.force_delay == FORCE_DELAY_IDENTIFIED:
+        _feel(state, params, tick)
     if tick.in_contact and not state.was_in_contact and params.new_contact != NEW_CONTACT_KEEP:
-        forget(state, params)
+        _begin(state, 0.0)
+        if params.new_contact == NEW_CONTACT_DAMPING:
+            state.damping_n_s_per_m = 0.0
     state.was_in_contact = tick.in_contact
 
-    # E(n), eq. 8's sum and the travel of this cycle
-    if params.pairing == PAIRING_EXACT or params.pairing == PAIRING_HELD_POWER:
-        force_n = tick.applied_contact_n if params.work == WORK_SPRING else tick.applied_n
-    elif params.work == WORK_SPRING or not tick.in_contact:
-        force_n = tick.contact_n
-    else:
-        force_n = tick.contact_n - state.damping_n_s_per_m * velocity
-    if params.pairing == PAIRING_EXACT or params.pairing == PAIRING_NEW_FORCE:
-        moved_m = _bounded(tick.moved_m)
-    else:
-        moved_m = _bounded(velocity * tick.dt_s)
-    state.energy_j = _bounded(state.energy_j - _bounded(_bounded(force_n) * moved_m))
-    if tick.in_contact:
-        state.motion_m2_per_s = _bounded(state.motion_m2_per_s + _bounded(velocity * velocity * tick.dt_s))
-        if tick.x_m < state.lowest_m:
-            state.lowest_m = tick.x_m
-        if tick.x_m > state.highest_m:
-            state.highest_m = tick.x_m
-
-    # eq. 10
+    _count_energy(state, params, tick)
     if params.plateaus == PLATEAUS_LITERAL and state.energy_j == state.window_energy_j:
         state.window_falls = 0
         state.window_rises = 0
     inside = tick.in_contact or params.contact_loss == CONTACT_LOSS_IGNORED
     future = params.window_future if params.window_future > 0 else params.window
-    ended = cycle_ended(state, state.energy_j, inside, params.window, future)
+    ended = cycle_ended(state, state.energy_j, inside, params.window, future)  # eq. 10
     if state.window_rises == 0:
         state.candidate_motion_m2_per_s = state.motion_m2_per_s
-        state.candidate_stored_j = _bounded(0.5 * abs(_bounded(tick.x_m) * _bounded(tick.contact_n)))
+        state.candidate_stored_j = 0.5 * abs(_bounded(tick.x_m) * _bounded(tick.contact_n))
     if ended:
-        end_cycle(state, params, tick)
+        _end_cycle(state, params, tick)
 
-    cap = damping_cap(state, params, tick)
+    cap = _cap(state, params, tick)
     if state.damping_n_s_per_m > cap:
         state.damping_n_s_per_m = cap
     elif state.damping_n_s_per_m < -cap:
         state.damping_n_s_per_m = -cap
     if not tick.in_contact:
         return 0.0
-    force_n = tick.contact_n - _bounded(state.damping_n_s_per_m * velocity)  # eq. 9
+    force_n: float = tick.contact_n - _bounded(state.damping_n_s_per_m * _bounded(tick.velocity_m_per_s))  # eq. 9
     if force_n < 0.0 and not params.wall_may_pull:
         force_n = 0.0
     return force_n
 
 
-def end_cycle(state: Any, params: Any, tick: Any) -> None:
-    """Eqs. 7 and 8; then energies count from here, so that they stay small however long the contact lasts."""
-    generated_j = state.window_minimum_j  # E_n - E_(n-1), since E_(n-1) is 0 here
-    if params.stored_energy == STORED_SUBTRACTED:
-        generated_j -= state.candidate_stored_j - state.stored_j
+def _count_energy(state: Any, params: Any, tick: Any) -> None:
+    """E(n) = E(n-1) - F(n-1) (x(n) - x(n-1)) or another reading of it, eq. 8's sum, and how far the cycle travels."""
+    velocity = _bounded(tick.velocity_m_per_s)
+    if params.pairing == PAIRING_EXACT or params.pairing == PAIRING_HELD_POWER:
+        held_n = _bounded(tick.applied_contact_n if params.work == WORK_SPRING else tick.applied_n)
+        work_n = state.last_work_n if state.forces_late else held_n
+        state.last_work_n = held_n
+    else:
+        work_n = _bounded(tick.contact_n)
+        if params.work == WORK_TOTAL and tick.in_contact:
+            work_n = _bounded(work_n - state.damping_n_s_per_m * velocity)
+    if params.pairing == PAIRING_EXACT or params.pairing == PAIRING_NEW_FORCE:
+        moved_m = _bounded(tick.moved_m)
+    else:
+        moved_m = _bounded(velocity * tick.dt_s)
+    state.energy_j = _bounded(state.energy_j - work_n * moved_m)
+    if tick.in_contact:
+        if tick.dt_s > 0.0:
+            state.motion_m2_per_s = _bounded(state.motion_m2_per_s + velocity * velocity * tick.dt_s)
+        if tick.x_m < state.lowest_m:
+            state.lowest_m = tick.x_m
+        if tick.x_m > state.highest_m:
+            state.highest_m = tick.x_m
+
+
+def _end_cycle(state: Any, params: Any, tick: Any) -> None:
+    """Eqs. 7 and 8; then energies count from here, so that they stay small however long a contact lasts."""
+    gained_j = state.window_minimum_j  # eq. 7: E_n - E_(n-1), as E_(n-1) is 0
+    pure_j = gained_j - (state.candidate_stored_j - state.stored_j)  # without what the spring holds
     motion = state.candidate_motion_m2_per_s
     travel_m = state.highest_m - state.lowest_m
-    if motion > TINY_SUM and travel_m >= params.min_travel_counts * tick.resolution_m:
-        change = _bounded(-generated_j / motion)
-        if params.rule == RULE_NON_DECREASING and change < 0.0:
+    if motion > TINY_MOTION and travel_m >= params.min_travel_counts * tick.resolution_m:
+        subtract = params.stored_energy == STORED_ENERGY_SUBTRACTED
+        change = _bounded(-(pure_j if subtract else gained_j) / motion)  # eq. 8
+        small = travel_m < params.small_travel_counts * tick.resolution_m
+        if small and change > 0.0 and params.small_leaks > 0.0 and params.sum == SUM_CYCLE:
+            enough = params.small_leaks * _bounded(-pure_j / motion)
+            change = max(0.0, min(change, enough - state.damping_n_s_per_m))
+        if change < 0.0 and params.rule == RULE_NON_DECREASING:
             change = 0.0
         state.damping_n_s_per_m += change
-        if params.rule == RULE_NON_NEGATIVE and state.damping_n_s_per_m < 0.0:
+        if state.damping_n_s_per_m < 0.0 and params.rule == RULE_NON_NEGATIVE:
             state.damping_n_s_per_m = 0.0
     state.energy_j -= state.window_minimum_j
     state.window_energy_j -= state.window_minimum_j
@@ -216,68 +238,91 @@ def end_cycle(state: Any, params: Any, tick: Any) -> None:
     state.highest_m = tick.x_m
 
 
-def damping_cap(state: Any, params: Any, tick: Any) -> float:
-    """Largest |alpha| now: a sampled damper on a mass m is itself unstable from 2 m/dt, with one sample late 0.83 m/dt."""
+def _cap(state: Any, params: Any, tick: Any) -> float:
+    """Largest damping now: on a mass m a sampled damper is itself unstable from 2 m/dt, one sample late 0.83 m/dt."""
+    if tick.dt_s > 0.0:
+        if state.period_s == 0.0:
+            state.period_s = _bounded(tick.dt_s)
+        state.period_s += 0.01 * (_bounded(tick.dt_s) - state.period_s)
     cap: float = params.cap_damping_n_s_per_m
     if params.cap == CAP_NONE:
         cap = LIMIT
-    elif params.cap != CAP_FIXED and tick.dt_s > 0.0:
+    elif params.cap != CAP_FIXED and state.period_s > 0.0:
         mass_kg = params.mass_kg if params.cap == CAP_KNOWN_MASS else state.felt_mass_kg
         if mass_kg > 0.0:
-            cap = _bounded(params.cap_share * mass_kg / tick.dt_s)
+            share = params.late_cap_share if state.forces_late else params.cap_share
+            cap = _bounded(share * mass_kg / state.period_s)
     return cap
 
 
-def feel_mass(state: Any, params: Any, tick: Any) -> None:
-    """Identify the mass that the wall pushes, from how the mean speed of two successive samples changes.
+def _feel(state: Any, params: Any, tick: Any) -> None:
+    """Identify the mass that the wall pushes, and whether it is pushed one sample late.
 
-    Held forces make it exact, even where samples are not equally far apart:
-        w = moved(n)/dt(n) - moved(n-1)/dt(n-1)  =  u / m,   u = (F(n-1) dt(n) + F(n-2) dt(n-1)) / 2
-    The hand's slow force is the intercept of the line, its slope 1/m.
+    A held force makes the change of mean speed between two moves exact, evenly sampled or not:
+
+        w = moved(n)/dt(n) - moved(n-1)/dt(n-1) = u / m,      u = (F(n-1) dt(n) + F(n-2) dt(n-1)) / 2
+
+    The hand's slow force is the intercept of the line of w over u, its slope is 1/m. A second line over forces one
+    sample older tells the delay: the one that explains more of w is believed.
     """
-    moved_m = _bounded(tick.moved_m)
     applied_n = _bounded(tick.applied_n)
-    enough_m = FELT_COUNTS * tick.resolution_m
-    if (
-        tick.dt_s > 0.0
-        and state.last_dt_s > 0.0
-        and applied_n != 0.0
-        and state.last_applied_n != 0.0
-        and abs(moved_m) > enough_m
-    ):
-        u = _bounded(0.5 * (applied_n * tick.dt_s + state.last_applied_n * state.last_dt_s))
-        w = _bounded(_bounded(moved_m / tick.dt_s) - _bounded(state.last_moved_m / state.last_dt_s))
+    moved_m = _bounded(tick.moved_m)
+    dt_s = _bounded(tick.dt_s)
+    seen = applied_n != 0.0 and state.last_applied_n != 0.0 and state.older_applied_n != 0.0
+    if seen and dt_s > 0.0 and state.last_dt_s > 0.0 and abs(moved_m) > FELT_COUNTS * tick.resolution_m:
+        w = _bounded(_bounded(moved_m / dt_s) - _bounded(state.last_moved_m / state.last_dt_s))
+        u = _bounded(0.5 * (applied_n * dt_s + state.last_applied_n * state.last_dt_s))
+        late_u = _bounded(0.5 * (state.last_applied_n * dt_s + state.older_applied_n * state.last_dt_s))
         keep = params.felt_mass_memory
         state.count = keep * state.count + 1.0
-        state.sum_u = keep * state.sum_u + u
         state.sum_w = keep * state.sum_w + w
+        state.sum_u = keep * state.sum_u + u
         state.sum_uu = keep * state.sum_uu + u * u
         state.sum_uw = keep * state.sum_uw + u * w
-        variance = state.sum_uu - state.sum_u * state.sum_u / state.count
-        covariance = state.sum_uw - state.sum_u * state.sum_w / state.count
-        if state.count >= FELT_SAMPLES and variance > 0.0 and covariance > 0.0:
-            state.felt_mass_kg = _bounded(variance / covariance)
+        state.late_sum_u = keep * state.late_sum_u + late_u
+        state.late_sum_uu = keep * state.late_sum_uu + late_u * late_u
+        state.late_sum_uw = keep * state.late_sum_uw + late_u * w
+        if state.count >= FELT_SAMPLES:
+            _believe(state, params)
     state.last_moved_m = moved_m
-    state.last_dt_s = tick.dt_s
+    state.last_dt_s = dt_s
+    state.older_applied_n = state.last_applied_n
     state.last_applied_n = applied_n
 
 
-def forget(state: Any, params: Any) -> None:
-    """A new contact begins from nothing."""
-    state.energy_j = 0.0
-    state.window_energy_j = 0.0
+def _believe(state: Any, params: Any) -> None:
+    """Mass and delay from the line that fits better; nothing where neither force speeds the device up."""
+    variance = state.sum_uu - state.sum_u * state.sum_u / state.count
+    covariance = state.sum_uw - state.sum_u * state.sum_w / state.count
+    late_variance = state.late_sum_uu - state.late_sum_u * state.late_sum_u / state.count
+    late_covariance = state.late_sum_uw - state.late_sum_u * state.sum_w / state.count
+    explained = 0.0
+    late_explained = 0.0
+    if variance > 0.0 and covariance > 0.0:
+        explained = covariance * covariance / variance
+    if late_variance > 0.0 and late_covariance > 0.0:
+        late_explained = late_covariance * late_covariance / late_variance
+    if params.force_delay == FORCE_DELAY_IDENTIFIED and (explained > 0.0 or late_explained > 0.0):
+        state.forces_late = late_explained > explained
+    if state.forces_late:
+        if late_explained > 0.0:
+            state.felt_mass_kg = _bounded(late_variance / late_covariance)
+    elif explained > 0.0:
+        state.felt_mass_kg = _bounded(variance / covariance)
+
+
+def _begin(state: Any, energy_j: float) -> None:
+    """Count energy and motion from here."""
+    state.energy_j = energy_j
+    state.window_energy_j = energy_j
+    state.window_minimum_j = 0.0
     state.window_falls = 0
     state.window_rises = 0
     state.motion_m2_per_s = 0.0
     state.candidate_motion_m2_per_s = 0.0
+    state.candidate_stored_j = 0.0
     state.stored_j = 0.0
-    if params.new_contact == NEW_CONTACT_DAMPING:
-        state.damping_n_s_per_m = 0.0
 
 
 def _bounded(value: float) -> float:
-    if value > LIMIT:
-        return LIMIT
-    if value < -LIMIT:
-        return -LIMIT
-    return value
+    return max(-LIMIT, min(LIMIT, value))

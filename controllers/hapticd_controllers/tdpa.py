@@ -26,7 +26,10 @@ class Params(LawParams):
         50.0, ge=0.0, le=1e9, description="largest damping that may be injected [N s/m]; 0: unbounded, as published"
     )
     min_speed_m_per_s: float = Field(
-        1e-3, ge=0.0, le=10.0, description="below this speed the debt waits, since v^2 divides it [m/s]; 0: as published"
+        1e-3,
+        ge=0.0,
+        le=10.0,
+        description="below this speed the debt waits, since v^2 divides it [m/s]; 0: as published",
     )
     carry_debt: bool = Field(
         True, description="a debt that the bounds left unpaid is paid later; false: it is forgiven at the next tick"

@@ -70,7 +70,8 @@ def serve_threaded(connection: Connection, text: str, heavy: bool) -> None:
         publishing = threading.Thread(target=publish)
         publishing.start()
         try:
-            kept.ticks.warnings = tuple(become_realtime(settings.loop))
+            problems, advice = become_realtime(settings.loop)
+            kept.ticks.warnings = tuple(problems + advice)
             control.run()
         finally:
             done.set()

@@ -390,15 +390,14 @@ def measure(
         rates.append(measure_rate(rate_hz, rate_s, rates[0].late_us.p50 if rates else 0.0))
         progress(rate_s)
     conditions = machine()
-    realtime = not measured.warnings
     return Report(
         conditions=conditions,
-        realtime=realtime,
+        realtime=measured.realtime,
         warnings=measured.warnings,
         period_us=1e6 / RATE_HZ,
         bodies=tuple(measured.bodies),
         pieces=tuple(measured.pieces),
-        bars=tuple(judge(measured.bodies, realtime, conditions.others)),
+        bars=tuple(judge(measured.bodies, measured.realtime, conditions.others)),
         rates=tuple(rates),
     )
 
@@ -415,11 +414,13 @@ class Bodies:
     Attributes:
         bodies: one a case.
         pieces: of the case that asked for them.
-        warnings: what was missing for real time.
+        realtime: whether it was a real-time process.
+        warnings: what it could not have.
     """
 
     bodies: list[Body]
     pieces: list[Piece]
+    realtime: bool
     warnings: tuple[str, ...]
 
 
@@ -603,7 +604,7 @@ def _measure_bodies(connection: Connection, found: Sequence[Case], ticks: int, r
         for sample in samples:
             sample.run(WARM_TICKS, None)  # first calls, before memory is locked
             del sample.hot[:]
-        warnings = tuple(become_realtime(LoopConfig()))
+        problems, advice = become_realtime(LoopConfig())
         sleep_until = make_sleeper()
         order = list(samples)
         for block in (ticks * (number + 1) // rounds - ticks * number // rounds for number in range(rounds)):
@@ -618,7 +619,7 @@ def _measure_bodies(connection: Connection, found: Sequence[Case], ticks: int, r
         return
     bodies = _bodies([sample for sample in samples if not sample.pieces])
     pieces = [piece for sample in samples for piece in _pieces(sample, bodies[0].paced_us.p50)]
-    connection.send(Bodies(bodies, pieces, warnings))
+    connection.send(Bodies(bodies, pieces, not problems, tuple(problems + advice)))
 
 
 def _bodies(samples: Sequence[_Samples]) -> list[Body]:

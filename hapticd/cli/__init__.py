@@ -20,6 +20,10 @@ COMMANDS: Final = {
     "devices": "List the installed device drivers and their options.",
     "controllers": "List the installed laws and their parameters.",
     "watch": "Show live what a running daemon measures.",
+    "arm": "Let a running daemon apply forces.",
+    "disarm": "Ramp the force of a running daemon to zero.",
+    "clear": "Clear the fault that stopped a running daemon.",
+    "reload": "Let a running daemon take its edited file over.",
     "simulate": "Run a configuration offline on the simulated device.",
     "bench": "Measure tick and simulator against a reference.",
 }

@@ -74,7 +74,7 @@ def tick(
         return
     console = _console()
     for warning in report.warnings:
-        console.print(f"[yellow]not real-time:[/] {escape(warning)}")
+        console.print(f"[yellow]{escape(warning)}[/]")
     table = _table(
         console,
         "Body of a tick at 1 kHz [us]; ratios to the arithmetic in the same run",

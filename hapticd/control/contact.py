@@ -43,9 +43,7 @@ class RunningLaw:
         try:
             self.module.start(self.state, self.params, snapshot)
         except Exception as error:  # noqa: BLE001 - a law is anybody's code
-            raise PluginError(
-                f"law {self.module.__name__} cannot start: {type(error).__name__}: {error}"
-            ) from error
+            raise PluginError(f"law {self.module.__name__} cannot start: {type(error).__name__}: {error}") from error
 
 
 class Contact:
@@ -257,10 +255,9 @@ def _number(value: Any) -> float:
         ArithmeticError: NaN, infinite or beyond all bounds.
         TypeError: not a number.
     """
-    if value.__class__ is not float:
-        if not isinstance(value, int | float):
-            raise TypeError(f"{value!r} is not a number")
-        value = float(value)
-    if not -MOST < value < MOST:
-        raise ArithmeticError(f"{value} is not a possible number")
-    return value
+    if not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is not a number")
+    number = float(value)
+    if not -MOST < number < MOST:
+        raise ArithmeticError(f"{number} is not a possible number")
+    return number

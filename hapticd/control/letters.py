@@ -73,9 +73,16 @@ class Letters:
         yield
 
     def _do_switch(
-        self, law: str, params: dict[str, Any], scene: dict[str, Any], safety: dict[str, Any], was: str, config: str
+        self,
+        law: str,
+        params: dict[str, Any],
+        scene: dict[str, Any],
+        safety: dict[str, Any],
+        keep_law: bool,
+        was: str,
+        config: str,
     ) -> Generator[None, None, None]:
-        """Take another law, scene and limits; all or nothing."""
+        """Take another law, scene and limits; all or nothing. A law that did not change keeps what it has learnt."""
         loop = self._loop
         tick = loop.tick
         if law not in self._laws:
@@ -92,12 +99,13 @@ class Letters:
         tick.switch_scene(new_scene)
         tick.guard.configure(new_safety, tick.info)
         tick.ramp_s = new_safety.ramp_s
-        if not tick.fallback:
-            tick.switch_law(lambda: RunningLaw(module, values))
-        else:
+        if not keep_law:
             tick.make_law = lambda: RunningLaw(module, values)
-        loop.law_count += 1
-        loop.event(EventCode.SWITCHED, f"law {was} -> {law}", law_before=was, law=law, config=config)
+            if not tick.fallback:
+                tick.switch_law(tick.make_law)
+            loop.law_count += 1
+        text = f"configuration {config}: law {law} goes on" if keep_law else f"configuration {config}: law {was} -> {law}"
+        loop.event(EventCode.SWITCHED, text, law_before=was, law=law, config=config)
 
     def _import(self, name: str) -> Generator[None, None, None]:
         """Import a law beside the loop; its ticks go on, at worst late by the switch interval."""

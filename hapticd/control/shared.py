@@ -46,6 +46,7 @@ class SharedMemory:
         descriptor: an existing memory to map; None makes a new one.
 
     Attributes:
+        view: all of it.
         words: the 64-bit words at the start.
         record_area: where the records lie.
         descriptor: file descriptor to hand to the other process.
@@ -65,15 +66,15 @@ class SharedMemory:
             os.ftruncate(descriptor, size)
         self.descriptor = descriptor
         self._map = mmap.mmap(descriptor, size)
-        self._view = memoryview(self._map)
-        self.words = self._view[:_VERDICT].cast("q")
-        self.record_area = self._view[_RECORDS:]
+        self.view = memoryview(self._map)
+        self.words = self.view[:_VERDICT].cast("q")
+        self.record_area = self.view[_RECORDS:]
 
     def close(self) -> None:
         """Unmap the memory."""
         self.words.release()
         self.record_area.release()
-        self._view.release()
+        self.view.release()
         self._map.close()
         os.close(self.descriptor)
 
@@ -84,8 +85,8 @@ class SharedMemory:
         if len(row) > _EVENT_SIZE - 8:
             row = msgpack.packb([event.code, text, event.seq, event.deadline_ns, {}])
         start = _EVENTS + self.words[EVENTS] % _EVENT_SLOTS * _EVENT_SIZE
-        self._view[start : start + 8] = len(row).to_bytes(8, "little")
-        self._view[start + 8 : start + 8 + len(row)] = row
+        self.view[start : start + 8] = len(row).to_bytes(8, "little")
+        self.view[start + 8 : start + 8 + len(row)] = row
         self.words[EVENTS] += 1
 
     def read_events(self, seen: int) -> list[Event]:
@@ -94,8 +95,8 @@ class SharedMemory:
         written = self.words[EVENTS]
         for number in range(max(seen, written - _EVENT_SLOTS), written):
             start = _EVENTS + number % _EVENT_SLOTS * _EVENT_SIZE
-            length = int.from_bytes(self._view[start : start + 8], "little")
-            events.append(Event(*msgpack.unpackb(self._view[start + 8 : start + 8 + length])))
+            length = int.from_bytes(self.view[start : start + 8], "little")
+            events.append(Event(*msgpack.unpackb(self.view[start + 8 : start + 8 + length])))
         return events
 
     def post(self, letter: dict[str, Any]) -> int:
@@ -109,27 +110,27 @@ class SharedMemory:
         packed: bytes = msgpack.packb(letter)
         if len(packed) > _MAILBOX_SIZE:
             raise HapticdError(f"the request is {len(packed)} bytes long, {_MAILBOX_SIZE} fit")
-        self._view[_MAILBOX : _MAILBOX + len(packed)] = packed
+        self.view[_MAILBOX : _MAILBOX + len(packed)] = packed
         self.words[MAIL_LENGTH] = len(packed)
         self.words[MAIL] += 1
         return self.words[MAIL]
 
     def letter(self) -> dict[str, Any]:
         """The letter that waits (control side)."""
-        unpacked: dict[str, Any] = msgpack.unpackb(self._view[_MAILBOX : _MAILBOX + self.words[MAIL_LENGTH]])
+        unpacked: dict[str, Any] = msgpack.unpackb(self.view[_MAILBOX : _MAILBOX + self.words[MAIL_LENGTH]])
         return unpacked
 
     def answer(self, verdict: str) -> None:
         """Answer it (control side): "" is done, anything else says why not."""
         row = verdict.encode()[: _MAILBOX - _VERDICT - 8]
-        self._view[_VERDICT : _VERDICT + 8] = len(row).to_bytes(8, "little")
-        self._view[_VERDICT + 8 : _VERDICT + 8 + len(row)] = row
+        self.view[_VERDICT : _VERDICT + 8] = len(row).to_bytes(8, "little")
+        self.view[_VERDICT + 8 : _VERDICT + 8 + len(row)] = row
         self.words[DONE] = self.words[MAIL]
 
     def verdict(self) -> str:
         """The answer to the last letter (supervisor side)."""
-        length = int.from_bytes(self._view[_VERDICT : _VERDICT + 8], "little")
-        return bytes(self._view[_VERDICT + 8 : _VERDICT + 8 + length]).decode(errors="replace")
+        length = int.from_bytes(self.view[_VERDICT : _VERDICT + 8], "little")
+        return bytes(self.view[_VERDICT + 8 : _VERDICT + 8 + length]).decode(errors="replace")
 
 
 class RecordReader:
@@ -168,3 +169,38 @@ class RecordReader:
             else:
                 records.append(layout.unpack(row))
         return records
+
+
+class EventReader:
+    """Reads events from their ring; never in the writer's way.
+
+    Args:
+        shared: the memory.
+
+    Attributes:
+        dropped: events lost because the reader was too slow.
+    """
+
+    def __init__(self, shared: SharedMemory) -> None:
+        self._shared = shared
+        self._next = 0
+        self.dropped = 0
+
+    def read(self) -> list[Event]:
+        """The events that are new, oldest first."""
+        view = self._shared.view
+        words = self._shared.words
+        written = words[EVENTS]
+        oldest = max(self._next, written - _EVENT_SLOTS + 1)
+        self.dropped += oldest - self._next
+        events = []
+        for number in range(oldest, written):
+            start = _EVENTS + number % _EVENT_SLOTS * _EVENT_SIZE
+            row = bytes(view[start : start + _EVENT_SIZE])
+            if words[EVENTS] - number >= _EVENT_SLOTS:  # overwritten, or just being so
+                self.dropped += 1
+            else:
+                length = int.from_bytes(row[:8], "little")
+                events.append(Event(*msgpack.unpackb(row[8 : 8 + length])))
+        self._next = written
+        return events

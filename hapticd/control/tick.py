@@ -1,6 +1,6 @@
 """One tick, without clocks or devices: sample in, force out. The daemon and every offline run share it.
 
-    positions -> velocities -> contacts -> laws -> guard -> force; then the books
+positions -> velocities -> contacts -> laws -> guard -> force; then the books
 """
 
 from __future__ import annotations
@@ -8,30 +8,34 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
-from hapticd.config.models import SceneConfig, VelocityConfig, WallConfig
+from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig, WallConfig
 from hapticd.contracts.driver import DeviceInfo, Sample
 from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.event import EventCode
 from hapticd.contracts.record import Flag
 from hapticd.control import fallback
 from hapticd.control.contact import Contact, RunningLaw
-from hapticd.guard import BLIND_RAMP_S, Guard, Mode
+from hapticd.energy import EnergyLedger
+from hapticd.guard import BLIND_RAMP_S, Guard, Mode, limits
 from hapticd.scene import Wall
 from hapticd.velocity import Estimator, make_estimator
 
 FROZEN_TICKS = 20
 """Samples in a row with the same device time or count after which a device counts as frozen."""
 
-MOST_N = 1e12
-"""A law that asks for more is broken, whatever the limits are [N]."""
+LEAST_S = 1e-9
+MOST_S = 1.0
+"""Time between two samples [s]: less is standing still, and for longer the nominal period goes into the laws."""
 
+MOST_M = 1e7
 MOST_M_PER_S = 1e6
-"""A velocity beyond this is not one [m/s]."""
+"""No position and no velocity is beyond these, whatever a device declares [m], [m/s]."""
 
 MARGIN = 0.5
 """How far outside its declared workspace, as a share of its size, a device may claim to be."""
 
 
+_IMPOSSIBLE = "the device reported a position that is not possible"
 _MODE_FLAGS = (0, int(Flag.ARMED), int(Flag.RELEASING))  # in the order of guard.Mode
 _LIMITED = int(Flag.LIMITED)
 _LATCHED = int(Flag.LATCHED)
@@ -79,6 +83,8 @@ class ControlTick:
 
     Attributes:
         contacts: one a wall, in scene order.
+        leaving: walls that are gone and whose force still fades out.
+        past: books of the walls that are gone, so that the sums over all walls never jump.
         force_n: force applied by the last tick, one element an axis [N].
         requested_n: what the laws asked for [N].
         position_m, velocity_m_per_s: as used by the last tick.
@@ -87,7 +93,7 @@ class ControlTick:
         fault_text: what there is to say about it.
 
     Raises:
-        ConfigError: the scene does not fit the device.
+        ConfigError: the scene or the way to find the velocity does not fit the device.
     """
 
     def __init__(
@@ -100,6 +106,8 @@ class ControlTick:
         period_s: float,
         ramp_s: float,
     ) -> None:
+        if velocity.estimator == "device" and not info.has_velocity:
+            raise ConfigError(f'velocity.estimator = "device": {info.model} does not measure its velocity')
         axes = len(info.axes)
         self.info = info
         self.guard = guard
@@ -109,7 +117,8 @@ class ControlTick:
         self.contacts = [
             Contact(wall, make_law(), info.resolution_m) for wall in compile_walls(scene.walls, info, period_s)
         ]
-        self.leaving: list[tuple[Contact, float]] = []
+        self.leaving: list[Contact] = []
+        self.past = EnergyLedger()
         self.estimators: list[Estimator] = [make_estimator(velocity, info.resolution_m) for _ in range(axes)]
         self.force_n = [0.0] * axes
         self.requested_n = [0.0] * axes
@@ -119,15 +128,19 @@ class ControlTick:
         self.fallback = False
         self.fault = 0
         self.fault_text = ""
+        self._last_fault = 0
         self._axes = range(axes)
         self._bounds_m = [
-            (low - MARGIN * (high - low), high + MARGIN * (high - low)) for low, high in info.workspace_m
+            (max(low - MARGIN * (high - low), -MOST_M), min(high + MARGIN * (high - low), MOST_M))
+            for low, high in info.workspace_m
         ]
+        self._active = self.contacts  # and those that leave
         self._time_ns = -1
         self._sequence = -1
         self._frozen = 0
+        self._blind = True
         self._blind_gain = 0.0
-        self._blind_from_n: list[float] = []
+        self._blind_from_n = [0.0] * axes
 
     @property
     def ramp_ticks(self) -> int:
@@ -148,39 +161,101 @@ class ControlTick:
         return flags
 
     def start(self, sample: Sample) -> None:
-        """Begin at a sample, at rest and without force; one that makes no sense is a fault at the first step."""
+        """Begin at a sample, at rest and without force; one that makes no sense is a fault at the first step.
+
+        Raises:
+            PluginError: the law cannot start.
+        """
         self._time_ns = sample.time_ns
         self._sequence = sample.sequence
-        for axis in self._axes:
-            self.position_m[axis] = position_m = sample.position_m[axis]
-            self.estimators[axis].start(position_m)
+        self._blind = not self._possible(sample)
+        if self._blind:
+            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
+        else:
+            for axis in self._axes:
+                self.position_m[axis] = position_m = sample.position_m[axis]
+                self.estimators[axis].start(position_m)
         for contact in self.contacts:
             contact.start(self.position_m[contact.wall.axis])
+            contact.law.start(contact.snapshot(0.0))
 
     def arm(self) -> bool:
-        """Let forces through; a wall that is already pressed comes in by a ramp. False while latched."""
+        """Let forces through; a wall that is already pressed comes in by a ramp. False while latched.
+
+        Raises:
+            PluginError: the law cannot start; nothing has changed then.
+        """
         if self.guard.mode is Mode.ARMED:
             return True
-        if not self.guard.arm():
+        if self.guard.latched:
             return False
+        laws = self._started(self.contacts, self.make_law)
+        self.guard.arm()
         self.fallback = False
-        self.switch_law(self.make_law)
+        self._take_laws(laws)
+        for contact in self._active:
+            self._blend(contact)
         return True
 
-    def switch_law(self, make_law: Callable[[], RunningLaw]) -> None:
-        """Put a law on every wall, without a step in force."""
-        self.make_law = make_law
+    def switch(
+        self,
+        scene: SceneConfig | None = None,
+        safety: SafetyConfig | None = None,
+        make_law: Callable[[], RunningLaw] | None = None,
+    ) -> None:
+        """Take another scene, other limits, another law: all or nothing, and without a step in force.
+
+        A wall that did not change keeps its clock, law and books; one that changed in place keeps law and books; one
+        that is gone fades out. Another law is put on every wall, but not in the place of the fallback.
+
+        Raises:
+            ConfigError: the scene or the limits do not fit the device; nothing has changed then.
+            PluginError: the law cannot start; nothing has changed then.
+        """
+        if safety is not None:
+            limits(safety, self.info)
+        contacts = self.contacts
+        changed: list[tuple[Contact, Wall]] = []
+        if scene is not None:
+            contacts, changed = self._arrange(compile_walls(scene.walls, self.info, self.period_s))
+        new = [contact for contact in contacts if contact not in self.contacts]
+        make = self.make_law if make_law is None else make_law
+        asked = self._started(new if make_law is None else contacts, make)
+        # From here on nothing can fail.
+        self.make_law = make
+        if safety is not None:
+            self.guard.configure(safety, self.info, self.force_n)
+            self.ramp_s = safety.ramp_s
         for contact in self.contacts:
-            contact.switch_law(make_law(), self.ramp_ticks)
+            if contact not in contacts:
+                self._let_go(contact)
+        for contact, wall in changed:
+            contact.wall = wall
+            self._blend(contact)
+        self.contacts = contacts
+        self._active = contacts + self.leaving
+        if self.fallback:
+            asked = self._started(new, self._fallback_law)
+        self._take_laws(asked)
+        for contact, _ in asked:
+            self._blend(contact)
+
+    def switch_law(self, make_law: Callable[[], RunningLaw]) -> None:
+        """Put a law on every wall, as `switch` does."""
+        self.switch(make_law=make_law)
+
+    def switch_scene(self, scene: SceneConfig) -> None:
+        """Put other walls in place, as `switch` does."""
+        self.switch(scene)
 
     def release(self, ramp_s: float | None = None) -> None:
         """Ramp the force to zero and stay disarmed."""
         self.guard.release(self.ramp_s if ramp_s is None else ramp_s)
 
     def fail(self, code: EventCode, text: str) -> None:
-        """Stop because of a fault: ramp the force to zero and latch."""
-        if not self.fault:
-            self.fault = code
+        """Stop because of a fault: ramp the force to zero and latch. The same fault is told once until cleared."""
+        if not self.fault and not (self.guard.latched and code == self._last_fault):
+            self.fault = self._last_fault = code
             self.fault_text = text
         self.guard.release(self.ramp_s, latch=True)
 
@@ -188,38 +263,10 @@ class ControlTick:
         """Put the damping fallback in the place of every law, and stop."""
         if not self.fallback:
             self.fallback = True
+            self._take_laws(self._started(self.contacts, self._fallback_law))
             for contact in self.contacts:
-                contact.switch_law(self._fallback_law(), self.ramp_ticks)
+                self._blend(contact)
         self.fail(code, text)
-
-    def switch_scene(self, scene: SceneConfig) -> None:
-        """Put other walls in place, without a step in force.
-
-        A wall that did not change keeps its clock, law and books; one that changed in place keeps law and books; one
-        that is gone fades out.
-
-        Raises:
-            ConfigError: the scene does not fit the device; nothing has changed then.
-        """
-        walls = compile_walls(scene.walls, self.info, self.period_s)
-        old = dict(enumerate(self.contacts))
-        contacts = []
-        for index, wall in enumerate(walls):
-            contact = old.get(index)
-            if contact is not None and contact.wall.config == wall.config:
-                del old[index]
-            elif contact is not None and contact.wall.same_place(wall):
-                del old[index]
-                contact.switch_wall(wall, self.ramp_ticks)
-            else:
-                contact = Contact(wall, self._fallback_law() if self.fallback else self.make_law(), self.info.resolution_m)
-                contact.start(self.position_m[wall.axis])
-                contact.blend(self.ramp_ticks)
-            contacts.append(contact)
-        for contact in old.values():
-            contact.switch_law(self._fallback_law(), self.ramp_ticks)
-            self.leaving.append((contact, 1.0))
-        self.contacts = contacts
 
     def step(self, sample: Sample, clock_dt_s: float) -> list[float]:
         """One tick.
@@ -232,39 +279,51 @@ class ControlTick:
             The force to write, one element an axis [N]; the same list every time.
         """
         seen = self._see(sample, clock_dt_s)
-        if not seen or self._blind_gain > 0.0:
-            return self._step_blind(self.period_s)
-        if self._blind_from_n:
-            self._blind_from_n = []
+        if not seen or self._blind:
+            if not seen or self._blind_gain > 0.0:
+                return self._step_blind()
+            self._see_again()
         position_m = self.position_m
         velocity_m_per_s = self.velocity_m_per_s
         requested_n = self.requested_n
         force_n = self.force_n
         dt_s = self.dt_s
+        guard = self.guard
+        contacts = self._active
         for axis in self._axes:
             requested_n[axis] = force_n[axis] = 0.0
-        for contact in self.contacts:
+        for contact in contacts:
             axis = contact.wall.axis
             contact.observe(position_m[axis], velocity_m_per_s[axis], dt_s)
-        self._act()
-        for contact in self.contacts:
-            outward = contact.wall.outward
-            axis = contact.wall.axis
+        try:
+            for contact in contacts:
+                contact.act()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
+            self._replace_laws(contact, error)
+        for contact in contacts:
+            wall = contact.wall
+            axis = wall.axis
+            outward = wall.outward
             force_n[axis] += outward * contact.force_n
             requested_n[axis] += outward * contact.requested_n
+        share = guard.reduce(force_n, self.period_s)
+        gain = guard.gain
+        limit_n = guard.limit_n
+        for contact in contacts:
+            contact.settle(share, gain, limit_n, dt_s)
         if self.leaving:
-            self._step_leaving(dt_s)
-        share = self.guard.share(force_n, dt_s)
-        for axis in self._axes:
-            force_n[axis] *= share
-        limit_n = self.guard.max_force_n
-        for contact in self.contacts:
-            contact.settle(share, limit_n)
+            self._drop_gone()
         return force_n
 
     def _fallback_law(self) -> RunningLaw:
         params = fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m)
         return RunningLaw(fallback, params)
+
+    def _possible(self, sample: Sample) -> bool:
+        """Whether the device may be where it says; a NaN is nowhere."""
+        return all(low <= at <= high for at, (low, high) in zip(sample.position_m, self._bounds_m, strict=True))
 
     def _see(self, sample: Sample, clock_dt_s: float) -> bool:
         """Take a sample in; False when it makes no sense."""
@@ -278,17 +337,24 @@ class ControlTick:
             self._sequence = sample.sequence
         if frozen:
             self._frozen += 1
-            if self._frozen == FROZEN_TICKS:
+            if self._frozen >= FROZEN_TICKS and self.guard.mode is Mode.ARMED:
                 self.fail(EventCode.DEVICE_FROZEN, f"the device repeated the same sample {FROZEN_TICKS} times")
         elif self._frozen:
             self._frozen = 0
-        self.dt_s = dt_s if 0.0 < dt_s < 1.0 else self.period_s
+        if LEAST_S <= dt_s < MOST_S:
+            self.dt_s = dt_s
+        else:
+            self.dt_s = self.period_s
+            if not MOST_S <= dt_s < math.inf:
+                dt_s = 0.0
         speed_squared = 0.0
         for axis in self._axes:
             position_m = sample.position_m[axis]
             low_m, high_m = self._bounds_m[axis]
             if not low_m <= position_m <= high_m:  # false for NaN as well
                 return False
+            if self._blind:
+                self.estimators[axis].start(position_m)
             velocity_m_per_s = self.estimators[axis].update(position_m, dt_s, sample.velocity_m_per_s[axis])
             if not -MOST_M_PER_S < velocity_m_per_s < MOST_M_PER_S:
                 return False
@@ -300,47 +366,96 @@ class ControlTick:
             self.fail(EventCode.OVER_SPEED, f"{math.sqrt(speed_squared):.3g} m/s is above the limit of {limit:g} m/s")
         return True
 
-    def _act(self) -> None:
-        """Ask every law; a law that raises or returns nonsense is replaced, and all are asked again."""
+    def _replace_laws(self, contact: Contact, error: BaseException) -> None:
+        """A law raised or returned nonsense: all are replaced, and asked again."""
         try:
-            for contact in self.contacts:
-                force_n = contact.act()
-                if not -MOST_N < force_n < MOST_N:  # false for NaN as well
-                    raise ArithmeticError(f"returned {force_n}")
-        except Exception as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
-            name = contact.law.module.__name__
-            self.fail_law(EventCode.LAW_FAILED, f"law {name}: {type(error).__name__}: {error}")
-            for contact in self.contacts:
-                contact.act()
+            text = f"{type(error).__name__}: {error}"
+        except Exception:  # noqa: BLE001 - an exception of anybody's making need not even be printable
+            text = type(error).__name__
+        self.fail_law(EventCode.LAW_FAILED, f"law {contact.law.module.__name__}: {text}")
+        for each in self._active:
+            each.act()
 
-    def _step_leaving(self, dt_s: float) -> None:
-        """Let walls fade out that a new scene no longer has."""
-        staying = []
-        for contact, gain in self.leaving:
-            left = gain - dt_s / self.ramp_s
-            if left <= 0.0:
-                continue
-            axis = contact.wall.axis
-            contact.observe(self.position_m[axis], self.velocity_m_per_s[axis], dt_s)
-            self.force_n[axis] += contact.wall.outward * left * contact.act()
-            contact.settle(left, self.guard.max_force_n)
-            staying.append((contact, left))
-        self.leaving = staying
-
-    def _step_blind(self, dt_s: float) -> list[float]:
+    def _step_blind(self) -> list[float]:
         """Let the last force out quickly: without a position there is no wall."""
         force_n = self.force_n
-        if not self._blind_from_n:
-            self.fail(EventCode.SAMPLE_IMPOSSIBLE, "the device reported a position that is not possible")
-            self._blind_from_n = list(force_n)
+        guard = self.guard
+        if not self._blind or guard.mode is Mode.ARMED:
+            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
+        if not self._blind:
+            self._blind = True
             self._blind_gain = 1.0
-            for contact in self.contacts:
+            self._blind_from_n = list(force_n)
+            for contact in self._active:
                 contact.lose_sight()
-        self._blind_gain -= dt_s / BLIND_RAMP_S
-        if self._blind_gain <= 0.0:
+        self._blind_gain -= self.period_s / BLIND_RAMP_S
+        if self._blind_gain <= 1e-9:
             self._blind_gain = 0.0
-            self.guard.drop()
+            guard.drop()
         for axis in self._axes:
             force_n[axis] = self._blind_gain * self._blind_from_n[axis]
             self.requested_n[axis] = 0.0
         return force_n
+
+    def _see_again(self) -> None:
+        """Positions make sense again: stand there, at rest; the force has long been let out."""
+        self._blind = False
+        for contact in self._active:
+            contact.start(self.position_m[contact.wall.axis])
+
+    def _started(
+        self, contacts: Iterable[Contact], make_law: Callable[[], RunningLaw]
+    ) -> list[tuple[Contact, RunningLaw]]:
+        """A law for each contact, started where the contact is now; nothing has changed yet."""
+        laws = []
+        for contact in contacts:
+            law = make_law()
+            law.start(contact.snapshot(self.velocity_m_per_s[contact.wall.axis]))
+            laws.append((contact, law))
+        return laws
+
+    def _take_laws(self, laws: Iterable[tuple[Contact, RunningLaw]]) -> None:
+        for contact, law in laws:
+            contact.take_law(law, self.velocity_m_per_s[contact.wall.axis], self.dt_s)
+
+    def _blend(self, contact: Contact) -> None:
+        contact.blend(self.ramp_ticks, self.guard.gain, self.guard.limit_n)
+
+    def _arrange(self, walls: list[Wall]) -> tuple[list[Contact], list[tuple[Contact, Wall]]]:
+        """Contacts for these walls, old ones where they fit, and which of those have to take their new wall."""
+        free = list(self.contacts)
+        found: dict[int, Contact] = {}
+        changed = []
+        for same in (lambda old, new: old.config == new.config, Wall.same_place):
+            for index, wall in enumerate(walls):
+                contact = next((each for each in free if index not in found and same(each.wall, wall)), None)
+                if contact is not None:
+                    free.remove(contact)
+                    found[index] = contact
+                    if contact.wall.config != wall.config:
+                        changed.append((contact, wall))
+        contacts = []
+        for index, wall in enumerate(walls):
+            if index not in found:
+                found[index] = Contact(wall, self._fallback_law(), self.info.resolution_m)
+                found[index].start(self.position_m[wall.axis])
+            contacts.append(found[index])
+        return contacts, changed
+
+    def _let_go(self, contact: Contact) -> None:
+        """A wall that is gone: from now on it asks for nothing, and a blend takes its force there."""
+        nothing = {"stiffness_n_per_m": 0.0, "damping_n_s_per_m": 0.0, "changes": ()}
+        contact.wall = Wall(contact.wall.config.model_copy(update=nothing), contact.wall.axis, self.period_s)
+        law = RunningLaw(fallback, fallback.Params(damping_n_s_per_m=0.0))
+        self._take_laws([(contact, law)])
+        self._blend(contact)
+        self.leaving.append(contact)
+
+    def _drop_gone(self) -> None:
+        """Close the books of walls whose force has faded out."""
+        gone = [contact for contact in self.leaving if not contact.blending and contact.applied_n == 0.0]
+        if gone:
+            for contact in gone:
+                self.past.absorb(contact.ledger)
+            self.leaving = [contact for contact in self.leaving if contact not in gone]
+            self._active = self.contacts + self.leaving

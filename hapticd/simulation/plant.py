@@ -45,10 +45,23 @@ HAND_CHIRP: bool = True
 HAND_PRESS: bool = True
 HAND_RECORDED: bool = True
 
+PROFILE_CONSTANT, PROFILE_STEP, PROFILE_RAMP, PROFILE_SINE, PROFILE_CHIRP, PROFILE_PRESS, PROFILE_RECORDED = range(7)
+
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding and taking it away rounds to the nearest whole, half to even
 _TURN = 6.283185307179586
 _TERMS = 17  # of the series below: the next one is under 1e-19 of the sum
 _SWINGS_PER_PERIOD = 10.0
+
+
+_PROFILES: dict[type[Any], int] = {
+    ConstantForce: PROFILE_CONSTANT,
+    StepForce: PROFILE_STEP,
+    RampForce: PROFILE_RAMP,
+    SineForce: PROFILE_SINE,
+    ChirpForce: PROFILE_CHIRP,
+    PressAndReleaseForce: PROFILE_PRESS,
+    RecordedForce: PROFILE_RECORDED,
+}
 
 
 class PlantState:
@@ -109,6 +122,7 @@ class PlantParams:
         delay_samples: periods between command and force.
         resolution_m: step of the sensor [m].
         noise_m: standard deviation of the sensor noise, times sqrt(3) [m].
+        hand_profile: which function of time the hand follows, one of the `PROFILE_` numbers.
         hand_n, hand_from_n, hand_at_s, hand_duration_s, hand_hz, hand_end_hz, hand_repeat: profile of the hand.
     """
 
@@ -123,6 +137,7 @@ class PlantParams:
         "hand_from_n",
         "hand_hz",
         "hand_n",
+        "hand_profile",
         "hand_repeat",
         "lag_keep",
         "lag_mean",
@@ -156,6 +171,7 @@ class PlantParams:
     delay_samples: int
     resolution_m: float
     noise_m: float
+    hand_profile: int
     hand_n: float
     hand_from_n: float
     hand_at_s: float
@@ -236,26 +252,26 @@ def hand_force(state: PlantState, params: PlantParams, buffers: Buffers) -> floa
     """Force that the hand means to give over the period that starts now [N]."""
     if TIMED:
         t_s = state.tick * params.period_s
-        if HAND_STEP:
+        if HAND_STEP and params.hand_profile == PROFILE_STEP:
             return params.hand_n if t_s >= params.hand_at_s else params.hand_from_n
-        if HAND_RAMP:
+        if HAND_RAMP and params.hand_profile == PROFILE_RAMP:
             if t_s <= params.hand_at_s:
                 return params.hand_from_n
             done = (t_s - params.hand_at_s) / params.hand_duration_s
             if done >= 1.0:
                 return params.hand_n
             return params.hand_from_n + done * (params.hand_n - params.hand_from_n)
-        if HAND_SINE:
+        if HAND_SINE and params.hand_profile == PROFILE_SINE:
             return params.hand_from_n + params.hand_n * sine(params.hand_hz * t_s)
-        if HAND_CHIRP:
+        if HAND_CHIRP and params.hand_profile == PROFILE_CHIRP:
             swept_s = t_s if t_s < params.hand_duration_s else params.hand_duration_s
             rise_hz = (params.hand_end_hz - params.hand_hz) / params.hand_duration_s
             turns = (params.hand_hz + 0.5 * rise_hz * swept_s) * swept_s + params.hand_end_hz * (t_s - swept_s)
             return params.hand_from_n + params.hand_n * sine(turns)
-        if HAND_PRESS:
+        if HAND_PRESS and params.hand_profile == PROFILE_PRESS:
             pressed = 0.5 - 0.5 * sine(t_s * params.hand_hz + 0.25)
             return params.hand_from_n + pressed * (params.hand_n - params.hand_from_n)
-        if HAND_RECORDED:
+        if HAND_RECORDED and params.hand_profile == PROFILE_RECORDED:
             return recorded(state, params, buffers, t_s)
     return params.hand_n
 
@@ -536,6 +552,7 @@ def _params(options: SimulationOptions, values: dict[str, float], period_s: floa
 def _hand(options: SimulationOptions) -> dict[str, float | int]:
     force = options.hand.force
     fields: dict[str, float | int] = {
+        "hand_profile": _PROFILES[type(force)],
         "hand_n": 0.0,
         "hand_from_n": 0.0,
         "hand_at_s": 0.0,

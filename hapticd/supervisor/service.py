@@ -14,12 +14,14 @@ from hapticd.config.loading import LoadedConfig, load
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.contracts.record import Flag, TickRecord
-from hapticd.control.shared import DONE, MAIL, SKIPPED
+from hapticd.control.shared import SKIPPED
+from hapticd.supervisor.commands import CommandSocket, Reply
 from hapticd.supervisor.controlled import Control
 from hapticd.supervisor.instance import InstanceLock
 from hapticd.supervisor.notify import Notifier
 from hapticd.supervisor.release import release_device
-from hapticd.telemetry.endpoint import TELEMETRY
+from hapticd.supervisor.requests import Answer, Requests
+from hapticd.telemetry.endpoint import CONTROL, TELEMETRY
 from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.status import LateHistogram, Status
 from hapticd.telemetry.wire import measure_epoch_offset_ns
@@ -30,7 +32,18 @@ DRAIN_S = 0.01
 STATUS_S = 1.0
 STOP_TIMEOUT_S = 3.0
 
+KNOWN = ("status", "arm", "disarm", "clear", "reload", "stop")
+"""What the control socket understands."""
+
 log = logging.getLogger("hapticd")
+
+
+def _nobody(_verdict: str) -> None:
+    """Answer to a request that nobody waits for."""
+
+
+def _answering(reply: Reply) -> Answer:
+    return lambda verdict: reply(not verdict, verdict)
 
 
 class Service:
@@ -61,7 +74,10 @@ class Service:
                 measure_epoch_offset_ns(),
             )
             undo.callback(self.publisher.close)
+            self.commands = CommandSocket(self.lock.directory / CONTROL)
+            undo.callback(self.commands.close)
             self._undo = undo.pop_all()
+        self.requests = Requests(self.control.shared)
         self.exit_code: int | None = None
         self._late = LateHistogram()
         self._busy_max_us = 0.0
@@ -75,7 +91,7 @@ class Service:
         self._fed_s = 0.0
         self._stopping = False
         self._stop_by_s = 0.0
-        self._reload: LoadedConfig | None = None
+        self._status = Status()
 
     def run(self) -> int:
         """Serve until told to stop; returns the exit code."""
@@ -88,7 +104,7 @@ class Service:
         loop = asyncio.get_running_loop()
         loop.add_signal_handler(signal.SIGTERM, self._stop, "SIGTERM")
         loop.add_signal_handler(signal.SIGINT, self._stop, "interrupt")
-        loop.add_signal_handler(signal.SIGHUP, self.reload)
+        loop.add_signal_handler(signal.SIGHUP, self.reload, _nobody)
         settings = self.config.config
         log.info(
             "%s: %s on %s at %g Hz, law %s, publishing on %s",
@@ -111,8 +127,8 @@ class Service:
         now_s = time.monotonic()
         self.control.beat()
         self._publish()
-        if self._reload is not None:
-            self._finish_reload(self._reload)
+        self._obey()
+        self.requests.turn()
         if self.control.exit_code is not None:
             self._control_ended()
         elif self.control.stalled():
@@ -193,35 +209,55 @@ class Service:
         self._tell_now(EventCode.CONTROL_LOST, f"{text}; {outcome}")
         self.exit_code = 1
 
-    def reload(self) -> None:
-        """Read the configuration file again and hand law, scene and limits to the loop; a bad file changes nothing."""
+    def _obey(self) -> None:
+        """Do what the control socket asks for."""
+        for request, reply in self.commands.receive():
+            match request["do"]:
+                case "status":
+                    reply(True, status=self._status.as_map())
+                case "arm" | "disarm" | "clear" as do:
+                    self.requests.submit({"do": do}, _answering(reply))
+                case "reload" if request.get("wait"):
+                    self.reload(_answering(reply))
+                case "reload":
+                    reply(True)
+                    self.reload(_nobody)
+                case "stop":
+                    self._stop("asked over the control socket")
+                    reply(True)
+                case other:
+                    reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
+
+    def reload(self, answer: Answer) -> None:
+        """Read the configuration file again and hand law, scene and limits to the loop; a bad file changes nothing.
+
+        Args:
+            answer: told "" when the new configuration is in force, else why it is not.
+        """
         self.notifier.send("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
         try:
             wanted = load(self.config.path)
             self._check_reloadable(wanted)
-            self.control.shared.post(self._switch_letter(wanted))
         except HapticdError as error:
-            self._refuse(str(error))
+            self._refuse(str(error), answer)
             return
-        self._reload = wanted
 
-    def _finish_reload(self, wanted: LoadedConfig) -> None:
-        words = self.control.shared.words
-        if words[DONE] != words[MAIL]:
-            return
-        self._reload = None
-        verdict = self.control.shared.verdict()
-        if verdict:
-            self._refuse(f"{wanted.path}: {verdict}")
-            return
-        self.config = wanted
-        self.publisher.reconfigure(wanted.config.telemetry)
-        self.notifier.send("READY=1")
-        self._status_due_s = 0.0
+        def finish(verdict: str) -> None:
+            if verdict:
+                self._refuse(f"{wanted.path}: {verdict}", answer)
+                return
+            self.config = wanted
+            self.publisher.reconfigure(wanted.config.telemetry)
+            self.notifier.send("READY=1")
+            self._status_due_s = 0.0
+            answer("")
 
-    def _refuse(self, why: str) -> None:
+        self.requests.submit(self._switch_letter(wanted), finish)
+
+    def _refuse(self, why: str, answer: Answer) -> None:
         self._tell_now(EventCode.REFUSED, f"configuration refused, nothing changed: {why}")
         self.notifier.send("READY=1")
+        answer(why)
 
     def _check_reloadable(self, wanted: LoadedConfig) -> None:
         """Refuse what only a restart can change.
@@ -245,6 +281,7 @@ class Service:
             "params": wanted.params.model_dump(),
             "scene": settings.scene.model_dump(),
             "safety": settings.safety.model_dump(),
+            "keep_law": settings.controller == self.config.config.controller,
             "was": self.config.config.controller.law,
             "config": wanted.hash,
         }
@@ -260,7 +297,7 @@ class Service:
         flags = last.flags if last else 0
         limit_n = settings.safety.max_force_n or info.max_force_n
         lifted = settings.safety.profile == "simulation" or limit_n == float("inf")
-        status = Status(
+        self._status = status = Status(
             version=hapticd.__version__,
             instance=self.instance,
             rate_hz=settings.loop.rate_hz,

@@ -12,6 +12,8 @@ from hapticd.contracts.errors import ConfigError, InstanceError
 DEFAULT_INSTANCE = "default"
 TELEMETRY = "telemetry"
 """Name of the telemetry socket in the runtime directory."""
+CONTROL = "control"
+"""Name of the control socket beside it."""
 
 _SYSTEM = Path("/run/hapticd")
 _INSTANCE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")

@@ -1,0 +1,91 @@
+"""The control socket: requests from this computer, answered by whoever they are for.
+
+A request is one msgpack map with the key `do`; the answer is one with `ok` and `text`. What is not understood is
+refused by name, and nothing that arrives can raise.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import zmq
+
+from hapticd.contracts.errors import InstanceError
+
+_LARGEST_REQUEST = 1 << 16
+_MOST_AT_ONCE = 50
+_LAST_WORDS_MS = 100
+
+Reply = Callable[..., None]
+"""Call with ok, text and further fields of the answer."""
+
+
+class CommandSocket:
+    """A ROUTER on the instance's runtime directory.
+
+    Args:
+        path: where the socket lies; its directory decides who may reach it.
+
+    Raises:
+        InstanceError: it cannot be bound.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._context = zmq.Context(io_threads=1)
+        self._socket = self._context.socket(zmq.ROUTER)
+        self._socket.setsockopt(zmq.LINGER, _LAST_WORDS_MS)
+        self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
+        try:
+            self._socket.bind(f"ipc://{path}")
+            path.chmod(0o660)
+        except (zmq.ZMQError, OSError) as error:
+            self.close()
+            raise InstanceError(f"ipc://{path}: {error.strerror}; run as the user that owns the directory") from error
+
+    def receive(self) -> list[tuple[dict[str, Any], Reply]]:
+        """Requests that have come, each with how to answer it; those that make no sense are answered here."""
+        requests = []
+        for _ in range(_MOST_AT_ONCE):
+            try:
+                identity, *frames = self._socket.recv_multipart(zmq.NOBLOCK)
+            except zmq.Again:
+                break
+            reply = self._replier(identity)
+            request = _decoded(frames)
+            if request is None:
+                reply(False, 'a request is one msgpack map with a text under "do"')
+            else:
+                requests.append((request, reply))
+        return requests
+
+    def close(self) -> None:
+        """Let go of the path; answers under way have a moment to leave."""
+        self._socket.close()
+        self._context.term()
+        self._path.unlink(missing_ok=True)
+
+    def _replier(self, identity: bytes) -> Reply:
+        def reply(ok: bool, text: str = "", **fields: Any) -> None:
+            answer = msgpack.packb({"ok": ok, "text": text, **fields})
+            with contextlib.suppress(zmq.ZMQError):  # whoever asked has gone
+                self._socket.send_multipart((identity, answer), zmq.NOBLOCK)
+
+        return reply
+
+
+def _decoded(frames: list[bytes]) -> dict[str, Any] | None:
+    """The request in these frames; None when it is none."""
+    if len(frames) != 1:
+        return None
+    try:
+        request = msgpack.unpackb(frames[0])
+    except Exception:  # noqa: BLE001 - msgpack has many ways to say that bytes make no sense
+        return None
+    if not isinstance(request, dict) or not isinstance(request.get("do"), str):
+        return None
+    return request if all(isinstance(key, str) for key in request) else None
