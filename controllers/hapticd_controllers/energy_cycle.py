@@ -165,10 +165,12 @@ def step(state: Any, params: Any, tick: Any) -> float:
     inside = tick.in_contact or params.contact_loss == CONTACT_LOSS_IGNORED
     future = params.window_future if params.window_future > 0 else params.window
     ended = cycle_ended(state, state.energy_j, inside, params.window, future)  # eq. 10
-    if state.window_rises == 0:
+    if state.window_rises == 0 and (not ended or state.window_minimum_j == state.energy_j):
         state.candidate_motion_m2_per_s = state.motion_m2_per_s
         state.candidate_stored_j = 0.5 * abs(_bounded(tick.x_m) * _bounded(tick.contact_n))
     if ended:
+        if state.count >= FELT_SAMPLES:
+            _believe(state, params)
         _end_cycle(state, params, tick)
 
     cap = _cap(state, params, tick)
@@ -282,8 +284,6 @@ def _feel(state: Any, params: Any, tick: Any) -> None:
         state.late_sum_u = keep * state.late_sum_u + late_u
         state.late_sum_uu = keep * state.late_sum_uu + late_u * late_u
         state.late_sum_uw = keep * state.late_sum_uw + late_u * w
-        if state.count >= FELT_SAMPLES:
-            _believe(state, params)
     state.last_moved_m = moved_m
     state.last_dt_s = dt_s
     state.older_applied_n = state.last_applied_n
@@ -325,4 +325,6 @@ def _begin(state: Any, energy_j: float) -> None:
 
 
 def _bounded(value: float) -> float:
-    return max(-LIMIT, min(LIMIT, value))
+    if -LIMIT < value < LIMIT:
+        return value
+    return LIMIT if value > 0.0 else -LIMIT

@@ -39,7 +39,7 @@ class Params(LawParams):
     )
     observer: Literal["exact", "printed"] = Field(
         "exact",
-        description="exact: -F(n-1)(x(n)-x(n-1)) with the applied force; printed: -F(n) v(n) dt, blind to the hold's leak",
+        description="exact: -F(n-1)(x(n)-x(n-1)) with the applied force; printed: -F(n) v(n) dt, blind to the leak",
     )
 
 
@@ -92,8 +92,6 @@ def step(state: Any, params: Any, tick: Any) -> float:
 
 
 def _bounded(value: float) -> float:
-    if value > LIMIT:
-        return LIMIT
-    if value < -LIMIT:
-        return -LIMIT
-    return value
+    if -LIMIT < value < LIMIT:
+        return value
+    return LIMIT if value > 0.0 else -LIMIT

@@ -42,7 +42,9 @@ class RunningLaw:
         """
         try:
             self.module.start(self.state, self.params, snapshot)
-        except Exception as error:  # noqa: BLE001 - a law is anybody's code
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             raise PluginError(f"law {self.module.__name__} cannot start: {type(error).__name__}: {error}") from error
 
 

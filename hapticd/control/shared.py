@@ -26,7 +26,7 @@ HISTORY_S = 8.0
 """How much of the past the ring of records holds [s]."""
 
 RECORDS, CONTROL_BEAT, SUPERVISOR_BEAT, MAIL, MAIL_LENGTH, DONE, EVENTS, SKIPPED = range(8)
-"""Words: records written, heartbeats [ns], letters sent, length, letters answered, events written, deadlines skipped."""
+"""Words: records written, heartbeats [ns], letters sent, their length, letters answered, events, skipped deadlines."""
 
 _VERDICT = 4096
 _MAILBOX = 8192

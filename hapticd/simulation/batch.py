@@ -785,6 +785,7 @@ def _machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> An
     return sweep
 
 
+@lru_cache
 def _hints(cls: type[Any]) -> dict[str, type[Any]]:
     return {name: kind for name, kind in typing.get_type_hints(cls).items() if kind in (float, int, bool)}
 

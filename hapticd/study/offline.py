@@ -1,0 +1,234 @@
+"""A configuration on its simulated device, as fast as it goes: the daemon's tick without clock, process or telemetry.
+
+The numbers are the daemon's to the last bit, tick by tick, since the parts are the same and the simulated device
+advances by one period a tick whatever the host does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from hapticd.config.loading import LoadedConfig
+from hapticd.contracts.errors import ConfigError, DriverError
+from hapticd.control.contact import Contact
+from hapticd.control.process import make_tick, place_device
+from hapticd.control.tick import ControlTick
+from hapticd.guard import Mode
+from hapticd.simulation.device import SimulatedDevice
+from hapticd.simulation.options import SimulationOptions
+
+WINDOW_S = 0.5
+"""The end of a run that its summary looks at [s]."""
+
+PROGRESS_TICKS = 2000
+"""How often progress is told."""
+
+
+class Row(NamedTuple):
+    """One tick: x is relative to the first wall and positive outside, a positive force pushes out.
+
+    Attributes:
+        t_s: time since the first tick [s].
+        x_m, v_m_per_s: true position and velocity of the device.
+        x_measured_m: position as the device reports it [m].
+        force_n: force applied from this tick to the next [N].
+        force_requested_n: what wall and law asked for [N].
+        energy_j: energy that has flowed into all walls [J].
+        cycle: completed energy cycles of the first wall.
+        damping_n_s_per_m: damping of the law on the first wall; 0 when it has none.
+        in_contact: 1 inside the first wall, else 0.
+    """
+
+    t_s: float
+    x_m: float
+    v_m_per_s: float
+    x_measured_m: float
+    force_n: float
+    force_requested_n: float
+    energy_j: float
+    cycle: int
+    damping_n_s_per_m: float
+    in_contact: int
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What became of a run; means and spans are of its last `window_s` seconds.
+
+    Attributes:
+        ticks: ticks that were run.
+        window_s: the end of the run that is looked at [s].
+        peak_to_peak_m, measured_peak_to_peak_m: span of the true and of the measured position [m].
+        mean_depth_m: mean depth in the first wall, true position, negative outside [m].
+        displayed_stiffness_n_per_m: mean force over mean true depth while in contact; None without contact.
+        measured_stiffness_n_per_m: the same over the measured depth, which is what the law sees.
+        commanded_stiffness_n_per_m: stiffness of the first wall at the end; None without a wall.
+        cycles: completed energy cycles of the first wall.
+        damping_n_s_per_m: damping of the law at the end.
+        peak_force_n: largest force that was applied, magnitude, whole run [N].
+        energy_j, generated_j, dissipated_j: the books of all walls at the end [J].
+        fault: why the daemon would have stopped; None when it would not.
+    """
+
+    ticks: int
+    window_s: float
+    peak_to_peak_m: float
+    measured_peak_to_peak_m: float
+    mean_depth_m: float
+    displayed_stiffness_n_per_m: float | None
+    measured_stiffness_n_per_m: float | None
+    commanded_stiffness_n_per_m: float | None
+    cycles: int
+    damping_n_s_per_m: float
+    peak_force_n: float
+    energy_j: float
+    generated_j: float
+    dissipated_j: float
+    fault: str | None
+
+
+class OfflineRun:
+    """One run of a configuration.
+
+    Args:
+        loaded: the configuration.
+        duration_s: simulated time [s].
+
+    Attributes:
+        ticks: how many ticks that takes.
+        fault: why the daemon would have stopped, once it is known; None as long as it would not.
+
+    Raises:
+        ConfigError: the duration makes no sense, or the configuration is not one for a simulated device.
+    """
+
+    def __init__(self, loaded: LoadedConfig, duration_s: float) -> None:
+        self._loaded = loaded
+        self._period_ns = loaded.config.loop.period_ns
+        self.period_s = loaded.config.loop.period_s
+        if not (math.isfinite(duration_s) and duration_s >= self.period_s):
+            raise ConfigError(f"duration = {duration_s:g} s: must be at least one period, {self.period_s:g} s")
+        self.ticks = round(duration_s / self.period_s)
+        self.fault: str | None = None
+        device = loaded.config.device.driver
+        if not isinstance(loaded.options, SimulationOptions):
+            raise ConfigError(
+                f'{loaded.path}: device.driver = "{device}": only a simulated device runs offline, such as "loopback"'
+            )
+        if loaded.options.clock != "ticks":
+            raise ConfigError(f'{loaded.path}: device.options.clock = "{loaded.options.clock}": must be "ticks" offline')
+        self._driver = loaded.driver(loaded.options, self.period_s)
+        place_device(loaded, self._driver)
+        self._driver.open()
+        # The true position is nobody's business but a study's, so no driver publishes it.
+        self._model: SimulatedDevice = self._driver._device
+        try:
+            self._tick = make_tick(loaded, self._driver.info)
+        except BaseException:
+            self._driver.close()
+            raise
+
+    def run(self, take: Callable[[Row], object], progress: Callable[[int], None] | None = None) -> Summary:
+        """Run from the first tick to the last, or to where the model has diverged.
+
+        Args:
+            take: is given every row.
+            progress: is told now and then how many ticks are done.
+        """
+        window = _Window(min(self.ticks, max(1, round(WINDOW_S / self.period_s))), self.ticks)
+        for row in self._rows():
+            take(row)
+            window.enter(row)
+            if progress is not None and window.ticks % PROGRESS_TICKS == 0:
+                progress(window.ticks)
+        return window.summary(self._tick, self.period_s, self.fault)
+
+    def _rows(self) -> Iterator[Row]:
+        driver, tick, model, period_ns = self._driver, self._tick, self._model, self._period_ns
+        guard = tick.guard
+        first: Contact | None = tick.contacts[0] if tick.contacts else None
+        axis = first.wall.axis if first else 0
+        outward = first.wall.outward if first else 1.0
+        ledgers = [contact.ledger for contact in tick.contacts]
+        try:
+            tick.start(driver.read())
+            driver.enable()
+            tick.arm()
+            for count in range(self.ticks):
+                sample = driver.read()
+                force_n = tick.step(sample, self.period_s)
+                if guard.mode is not Mode.DISARMED:
+                    driver.write(force_n)
+                else:
+                    driver.disable()
+                if tick.fault:
+                    self.fault = self.fault or f"{count * period_ns / 1e9:g} s: {tick.fault_text}"
+                    tick.fault = 0
+                yield Row(
+                    count * period_ns / 1e9,
+                    model.x_m,
+                    model.v_m_per_s,
+                    first.x_m if first else tick.position_m[0],
+                    outward * force_n[axis],
+                    outward * tick.requested_n[axis],
+                    sum([ledger.energy_j for ledger in ledgers]),
+                    first.ledger.cycle if first else 0,
+                    first.damping_n_s_per_m if first else 0.0,
+                    int(first.in_contact) if first else 0,
+                )
+        except DriverError as error:
+            self.fault = self.fault or str(error)
+        finally:
+            driver.close()
+
+
+class _Window:
+    """Sums over the end of a run, so that no row need be kept."""
+
+    def __init__(self, length: int, ticks: int) -> None:
+        self.ticks = 0
+        self._from = ticks - length
+        self._length = length
+        self._rows: list[Row] = []
+        self._peak_n = 0.0
+        self._last: Row | None = None
+
+    def enter(self, row: Row) -> None:
+        self._peak_n = max(self._peak_n, abs(row.force_n))
+        if self.ticks >= self._from:
+            self._rows.append(row)
+        self._last = row
+        self.ticks += 1
+
+    def summary(self, tick: ControlTick, period_s: float, fault: str | None) -> Summary:
+        rows = self._rows or ([self._last] if self._last else [])
+        true_m = [row.x_m for row in rows] or [math.nan]
+        measured_m = [row.x_measured_m for row in rows] or [math.nan]
+        inside = [row for row in rows if row.in_contact]
+        ledgers = [contact.ledger for contact in tick.contacts]
+        return Summary(
+            ticks=self.ticks,
+            window_s=len(rows) * period_s,
+            peak_to_peak_m=max(true_m) - min(true_m),
+            measured_peak_to_peak_m=max(measured_m) - min(measured_m),
+            mean_depth_m=-sum(true_m) / len(true_m),
+            displayed_stiffness_n_per_m=_stiffness(inside, [row.x_m for row in inside]),
+            measured_stiffness_n_per_m=_stiffness(inside, [row.x_measured_m for row in inside]),
+            commanded_stiffness_n_per_m=tick.contacts[0].wall.stiffness_n_per_m if tick.contacts else None,
+            cycles=self._last.cycle if self._last else 0,
+            damping_n_s_per_m=self._last.damping_n_s_per_m if self._last else 0.0,
+            peak_force_n=self._peak_n,
+            energy_j=sum(ledger.energy_j for ledger in ledgers),
+            generated_j=sum(ledger.generated_j for ledger in ledgers),
+            dissipated_j=sum(ledger.dissipated_j for ledger in ledgers),
+            fault=fault,
+        )
+
+
+def _stiffness(rows: list[Row], x_m: list[float]) -> float | None:
+    """Mean force over mean depth; None where there is no depth."""
+    depth_m = -sum(x_m)
+    return sum(row.force_n for row in rows) / depth_m if depth_m > 0.0 else None

@@ -1,0 +1,196 @@
+"""What a running daemon is told: over its control socket, by signal, by an edited file."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import msgpack
+import pytest
+import zmq
+
+from hapticd.contracts.event import EventCode
+from tests.daemon.running import HAPTICD, Daemon, Subscriber, all_records
+from tests.daemon.test_deaths import PRESSED, pressing
+
+RAMP_TICKS = 50
+
+GOOD_LAW = '''
+"""A law of a lab's own: the wall with constant damping."""
+from pydantic import Field
+from hapticd.contracts.law import LawParams
+class Params(LawParams):
+    """One."""
+    damping_n_s_per_m: float = Field(8.0, ge=0)
+class State:
+    """Published."""
+    damping_n_s_per_m: float
+def start(state, params, snapshot):
+    """Damp at once."""
+    state.damping_n_s_per_m = params.damping_n_s_per_m
+def step(state, params, tick):
+    """F = F_contact - b v."""
+    return tick.contact_n - params.damping_n_s_per_m * tick.velocity_m_per_s
+'''
+
+BROKEN_LAW = GOOD_LAW.replace("return tick.contact_n", "return 1.0 / (tick.x_m - tick.x_m) + tick.contact_n")
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Daemon]:
+    package = tmp_path / "mylab"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "good.py").write_text(GOOD_LAW)
+    (package / "broken.py").write_text(BROKEN_LAW)
+    with Daemon(PRESSED, pythonpath=tmp_path).wait_ready() as running:
+        pressing(running)
+        yield running
+
+
+def ask(daemon: Daemon, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
+    return subprocess.run([HAPTICD, *arguments], env=environment, capture_output=True, text=True, timeout=30)
+
+
+def edit(daemon: Daemon, config: str) -> subprocess.CompletedProcess[str]:
+    daemon.config.write_text(config)
+    return ask(daemon, "reload", "--wait")
+
+
+def largest_step_after(daemon: Daemon, seq: int) -> float:
+    """Largest change of force from one tick to the next, from just before a tick to the end of a ramp behind it."""
+    memory = daemon.memory()
+    records = [record for record in all_records(memory) if seq - 1 <= record.seq <= seq + RAMP_TICKS + 5]
+    memory.close()
+    return max(abs(after.force_n[0] - before.force_n[0]) for before, after in pairwise(records))
+
+
+def test_an_edited_law_takes_over_without_a_missed_tick_or_a_step(daemon: Daemon) -> None:
+    with Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
+        assert edit(daemon, PRESSED + '[controller]\nlaw = "none"\n').returncode == 0
+        event = subscriber.until("hapticd/event", code=EventCode.SWITCHED)
+        assert (event["law_before"], event["law"]) == ("energy-cycle", "none")
+        with Subscriber(daemon.endpoint, "hapticd/position") as positions:
+            for _, fields in positions.maps():
+                if fields["seq"] > event["seq"] + RAMP_TICKS + 10:
+                    break
+        assert largest_step_after(daemon, event["seq"]) < 1.0
+
+
+def test_a_law_of_ones_own_is_imported_beside_the_loop(daemon: Daemon) -> None:
+    with Subscriber(daemon.endpoint) as subscriber:
+        assert edit(daemon, PRESSED + '[controller]\nlaw = "mylab.good"\n').returncode == 0
+        assert subscriber.until("hapticd/event", code=EventCode.SWITCHED)["law"] == "mylab.good"
+        assert subscriber.until("hapticd/damping", damping_n_s_per_m=[8.0])
+        assert subscriber.until("hapticd/status", law="mylab.good")["armed"]
+
+
+def test_a_wall_that_stiffens_in_the_file_stiffens_under_the_hand_by_a_ramp(daemon: Daemon) -> None:
+    with Subscriber(daemon.endpoint) as subscriber:
+        assert edit(daemon, PRESSED.replace("12000.0", "20000.0")).returncode == 0
+        event = subscriber.until("hapticd/event", code=EventCode.SWITCHED)
+        for topic, fields in subscriber.maps():
+            if topic == "hapticd/position" and fields["seq"] > event["seq"] + 1000:
+                assert fields["position_m"][0] == pytest.approx(-3.0 / 20000.0, abs=2.5e-5)
+                break
+        assert largest_step_after(daemon, event["seq"]) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("broken", "named"),
+    [
+        (PRESSED.replace("12000.0", "-1.0"), "scene.walls[0].stiffness_n_per_m"),
+        (PRESSED + '[controller]\nlaw = "energy-cicle"\n', "energy-cycle"),
+        (PRESSED + "[loop]\nrate_hz = 2000.0\n", "restart"),
+        (PRESSED + "[safety]\nmax_force_n = 50.0\n", "12 N"),
+        (PRESSED + '[[scene.walls]]\naxis = "x"\nstiffness_n_per_m = 1.0\n', "scene.walls[1].axis"),
+        ("[[[", "line 1"),
+    ],
+)
+def test_a_file_that_cannot_be_used_changes_nothing_and_names_the_place(daemon: Daemon, broken: str, named: str) -> None:
+    with Subscriber(daemon.endpoint) as subscriber:
+        before = subscriber.until("hapticd/status")
+        answer = edit(daemon, broken)
+        assert answer.returncode == 2
+        assert named in answer.stderr
+        assert "Traceback" not in answer.stderr
+        assert subscriber.until("hapticd/event", code=EventCode.REFUSED)
+        after = subscriber.until("hapticd/status")
+        assert after["config_hash"] == before["config_hash"]
+        assert after["armed"]
+
+
+def test_sighup_reloads_as_well(daemon: Daemon) -> None:
+    with Subscriber(daemon.endpoint) as subscriber:
+        daemon.config.write_text(PRESSED + '[controller]\nlaw = "tdpa"\n')
+        daemon.process.send_signal(signal.SIGHUP)
+        daemon.notified("READY=1")
+        assert subscriber.until("hapticd/status", law="tdpa")
+
+
+def test_disarm_lets_the_hand_through_and_arm_brings_the_wall_back(daemon: Daemon) -> None:
+    with Subscriber(daemon.endpoint) as subscriber:
+        assert ask(daemon, "disarm").returncode == 0
+        assert subscriber.until("hapticd/status", armed=False, releasing=False, latched=False)
+        assert subscriber.until("hapticd/position", force_n=[0.0])
+        assert ask(daemon, "arm").returncode == 0
+        assert subscriber.until("hapticd/status", armed=True)
+
+
+def test_a_law_that_raises_is_latched_until_cleared_and_armed_again(daemon: Daemon) -> None:
+    with Subscriber(daemon.endpoint) as subscriber:
+        assert edit(daemon, PRESSED + '[controller]\nlaw = "mylab.broken"\n').returncode == 0
+        event = subscriber.until("hapticd/event", code=EventCode.LAW_FAILED)
+        assert "ZeroDivisionError" in event["text"]
+        assert subscriber.until("hapticd/status", latched=True, armed=False, releasing=False)
+        refused = ask(daemon, "arm")
+        assert refused.returncode == 1
+        assert "hapticd clear" in refused.stderr
+        assert edit(daemon, PRESSED).returncode == 0
+        assert ask(daemon, "clear").returncode == 0
+        assert ask(daemon, "arm").returncode == 0
+        assert subscriber.until("hapticd/status", armed=True, latched=False, fallback=False)
+
+
+def test_no_daemon_is_one_line(tmp_path: Path) -> None:
+    environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(tmp_path)}
+    answer = subprocess.run([HAPTICD, "arm"], env=environment, capture_output=True, text=True, timeout=30)
+    assert answer.returncode == 1
+    assert answer.stderr.count("\n") == 1
+    assert "hapticd run" in answer.stderr
+
+
+def test_whatever_arrives_at_the_control_socket_is_refused_and_the_daemon_goes_on(daemon: Daemon) -> None:
+    rng = random.Random(7)
+    context = zmq.Context()
+    socket = context.socket(zmq.DEALER)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.connect(f"ipc://{daemon.directory}/run/default/control")
+    hostile = [
+        [b""],
+        [b"\xc1"],
+        [b"\x91" * 5000],
+        [msgpack.packb({"do": 7})],
+        [msgpack.packb({"do": "explode" * 100})],
+        [msgpack.packb(["arm"])],
+        [msgpack.packb({1: 2})],
+        [msgpack.packb({"do": "arm"}), b"more"],
+        *([rng.randbytes(rng.randrange(200))] for _ in range(500)),
+    ]
+    for frames in hostile:
+        socket.send_multipart(frames)
+        assert socket.poll(10_000)
+        assert not msgpack.unpackb(socket.recv())["ok"]
+    socket.send(msgpack.packb({"do": "status"}))
+    assert socket.poll(10_000)
+    answer = msgpack.unpackb(socket.recv())
+    assert answer["ok"]
+    assert answer["status"]["armed"]
+    socket.close()
+    context.term()
