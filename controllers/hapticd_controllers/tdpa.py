@@ -53,11 +53,7 @@ class State:
 
 def start(state: Any, params: Any, snapshot: Any) -> None:
     """Take over: a debt is carried over, a credit is not."""
-    state.energy_j = -snapshot.debt_j
-    if state.energy_j > 0.0:
-        state.energy_j = 0.0
-    if state.energy_j < -LIMIT:
-        state.energy_j = -LIMIT
+    state.energy_j = min(0.0, -_bounded(snapshot.debt_j))
     state.damping_n_s_per_m = 0.0
     state.speed_m_per_s = 0.0
 
@@ -68,12 +64,11 @@ def step(state: Any, params: Any, tick: Any) -> float:
     if not params.carry_debt and state.energy_j < 0.0:
         state.energy_j = 0.0
     if params.observer == OBSERVER_EXACT:
-        flow_j = -tick.applied_n * tick.moved_m  # E(n) = E(n-1) - F(n-1) (x(n) - x(n-1))
-    else:
-        flow_j = (
-            state.damping_n_s_per_m * state.speed_m_per_s * state.speed_m_per_s - tick.contact_n * velocity
-        ) * tick.dt_s
-    state.energy_j = _bounded(state.energy_j + _bounded(flow_j))
+        flow_j = -_bounded(tick.applied_n) * _bounded(tick.moved_m)  # E(n) = E(n-1) - F(n-1) (x(n) - x(n-1))
+    else:  # W(n) = W(n-1) + f(n) v(n) + alpha(n-1) v(n-1)^2
+        paid_w = state.damping_n_s_per_m * state.speed_m_per_s * state.speed_m_per_s
+        flow_j = (paid_w - _bounded(tick.contact_n) * velocity) * tick.dt_s
+    state.energy_j = _bounded(state.energy_j + flow_j)
     state.speed_m_per_s = abs(velocity)
     state.damping_n_s_per_m = 0.0
     if not tick.in_contact:

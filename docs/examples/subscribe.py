@@ -7,8 +7,8 @@ import zmq
 
 endpoint = sys.argv[1] if len(sys.argv) > 1 else "ipc:///run/hapticd/default/telemetry"
 socket = zmq.Context().socket(zmq.SUB)
-for topic in ("hapticd/position", "hapticd/cycle", "hapticd/event"):
-    socket.subscribe(topic)
+for wanted in ("hapticd/position", "hapticd/cycle", "hapticd/event"):
+    socket.subscribe(wanted)
 socket.connect(endpoint)
 
 last = None

@@ -5,12 +5,13 @@ Nothing here is a test: a benchmark reports, and says when the machine was too r
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -74,6 +75,7 @@ class Conditions:
         load_before, load_after: runnable tasks, mean of a minute.
         others: processors that other programs kept busy meanwhile, 0.5 is one of them half the time.
         stolen: processors that the host of a virtual machine gave to somebody else meanwhile.
+        rivals: other programs that ran under real-time scheduling at the start or the end; a loop has to wait for them.
         seconds: how long the measurement took [s].
     """
 
@@ -84,6 +86,7 @@ class Conditions:
     load_after: float
     others: float
     stolen: float
+    rivals: tuple[str, ...]
     seconds: float
 
 
@@ -103,6 +106,7 @@ def watch_machine() -> Callable[[], Conditions]:
     load_before = os.getloadavg()[0]
     busy_before_s, stolen_before_s = _processor_time_s()
     own_before_s = sum(os.times()[:4])
+    rivals_before = rivals()
 
     def conditions() -> Conditions:
         seconds = time.monotonic() - started_s
@@ -116,10 +120,35 @@ def watch_machine() -> Callable[[], Conditions]:
             load_after=os.getloadavg()[0],
             others=max(0.0, busy_s - busy_before_s - own_s) / seconds,
             stolen=(stolen_s - stolen_before_s) / seconds,
+            rivals=tuple(sorted(rivals_before | rivals())),
             seconds=seconds,
         )
 
     return conditions
+
+
+def rivals() -> set[str]:
+    """Programs under real-time scheduling, each as its process and name; the kernel's own threads are none."""
+    found = set()
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+            threads = [int(thread.name) for thread in (process / "task").iterdir()] if command else []
+        except OSError:  # it has just ended
+            continue
+        for thread in threads:
+            with contextlib.suppress(OSError):
+                if os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK in (os.SCHED_FIFO, os.SCHED_RR):
+                    found.add(f"{process.name} {command[:60]}")
+    return found
+
+
+def doubtful(bars: Iterable[Bar], conditions: Conditions) -> list[Bar]:
+    """The same bars; all of them inconclusive when other real-time programs were in the way."""
+    if not conditions.rivals:
+        return list(bars)
+    note = f"beside another real-time program: {conditions.rivals[0]}"
+    return [replace(bar, verdict="INCONCLUSIVE", note=note) for bar in bars]
 
 
 def _processor_time_s() -> tuple[float, float]:

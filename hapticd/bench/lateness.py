@@ -21,13 +21,13 @@ import time
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, ratio, watch_machine
+from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, doubtful, ratio, watch_machine
 from hapticd.bench.threaded import serve_threaded
-from hapticd.bench.tick import RecordedLoop, judge_body, scene, serve_daemon
+from hapticd.bench.tick import CALM, RecordedLoop, judge_body, scene, serve_daemon
 from hapticd.contracts.errors import HapticdError, RealtimeError
 
 Loop = Literal["C", "daemon", "thread"]
@@ -71,6 +71,7 @@ class Block:
         witness_us: the same of the witness.
         loop_skipped, witness_skipped: deadlines that each had to skip.
         busy_us: bodies of the loop's ticks, empty for the C loop [us].
+        others: processors that programs which have no part in this kept busy.
     """
 
     late_us: Mapping[int, float]
@@ -78,6 +79,7 @@ class Block:
     loop_skipped: int
     witness_skipped: int
     busy_us: Sequence[float] = ()
+    others: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +97,7 @@ class Cell:
         witness_late: share of ticks in which the witness was later than `LATE_US`.
         loop_over_1ms: ticks that the loop began more than a period late.
         busy_us: tick bodies [us].
+        others: processors that programs which have no part in this kept busy, mean of the blocks.
     """
 
     loop: Loop
@@ -109,6 +112,7 @@ class Cell:
     witness_late: float
     loop_over_1ms: int
     busy_us: Quantiles
+    others: float
 
     @property
     def inconclusive(self) -> bool:
@@ -175,18 +179,27 @@ def measure(
         for loop, load in order:
             measured[loop, load].append(run_block(witness, cpu, loop, load, block_s))
             progress(block_s)
-    conditions = machine()
     cells = tuple(pool(loop, load, parts) for (loop, load), parts in measured.items())
     bars = judge(cells, "daemon")
     bars += [
-        judge_body(f"daemon, {cell.load}", cell.busy_us.p99 * 1e3 / PERIOD_NS, True, conditions.others)
+        judge_body(f"daemon, {cell.load}", cell.busy_us.p99 * 1e3 / PERIOD_NS, True, cell.others)
         for cell in cells
         if cell.loop == "daemon"
     ]
     thread_bars = judge(cells, "thread")
     if negative_control:
         bars.append(judge_control(thread_bars))
-    return Report(conditions, cpu, seed, blocks, block_s, cells, tuple(bars), tuple(thread_bars))
+    conditions = machine()
+    return Report(
+        conditions=conditions,
+        cpu=cpu,
+        seed=seed,
+        blocks=blocks,
+        block_s=block_s,
+        cells=cells,
+        bars=tuple(doubtful(bars, conditions)),
+        thread_bars=tuple(doubtful(thread_bars, conditions)),
+    )
 
 
 def plan(blocks: int, negative_control: bool) -> list[tuple[Loop, Load]]:
@@ -233,6 +246,7 @@ def run_block(witness: Path, cpu: int, loop: Loop, load: Load, seconds: float) -
     Raises:
         HapticdError: one of them did not run.
     """
+    machine = watch_machine()
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="hapticd-bench-") as directory:
         if load == "burners":
             stack.enter_context(_burners(60.0 + seconds))
@@ -245,7 +259,8 @@ def run_block(witness: Path, cpu: int, loop: Loop, load: Load, seconds: float) -
         time.sleep(_SETTLE_S + seconds)
         late_us, busy_us = running.stop()
         _wait(watching)
-        return cut(late_us, read_pairs(file), busy_us, seconds)
+        block = cut(late_us, read_pairs(file), busy_us, seconds)
+    return replace(block, others=machine().others)
 
 
 def read_pairs(file: Path) -> dict[int, float]:
@@ -297,6 +312,7 @@ def pool(loop: Loop, load: Load, blocks: Sequence[Block]) -> Cell:
         witness_late=sum(witness_us > LATE_US for _, witness_us in pairs) / count,
         loop_over_1ms=sum(late_us * 1e3 > PERIOD_NS for late_us, _ in pairs),
         busy_us=Quantiles.of(busy for block in blocks for busy in block.busy_us),
+        others=sum(block.others for block in blocks) / (len(blocks) or 1),
     )
 
 
@@ -319,7 +335,12 @@ def judge(cells: Sequence[Cell], loop: Loop) -> list[Bar]:
         for name, measured, limit, in_tail in judged:
             verdict: Verdict = "PASS" if measured <= limit else "FAIL"
             note = _doubt(cell, reference, in_tail)
-            bars.append(Bar(f"{loop}, {cell.load}: {name}", measured, limit, "INCONCLUSIVE" if note else verdict, note))
+            if note:
+                verdict = "INCONCLUSIVE"
+            elif verdict == "FAIL" and cell.others > CALM:
+                # The witness shows what keeps a processor busy, but hardly what empties its caches.
+                note = f"other programs kept {cell.others:.2f} processors busy"
+            bars.append(Bar(f"{loop}, {cell.load}: {name}", measured, limit, verdict, note))
     return bars
 
 

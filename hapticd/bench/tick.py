@@ -24,7 +24,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from hapticd import registry
-from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, ratio, watch_machine
+from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, doubtful, ratio, watch_machine
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import MAX_WALLS, LoopConfig
 from hapticd.contracts.errors import HapticdError
@@ -397,7 +397,7 @@ def measure(
         period_us=1e6 / RATE_HZ,
         bodies=tuple(measured.bodies),
         pieces=tuple(measured.pieces),
-        bars=tuple(judge(measured.bodies, measured.realtime, conditions.others)),
+        bars=tuple(doubtful(judge(measured.bodies, measured.realtime, conditions.others), conditions)),
         rates=tuple(rates),
     )
 

@@ -157,7 +157,7 @@ def lateness(
         console,
         f"Excess over the witness at 1 kHz [us], processor {report.cpu}, {report.blocks} x {report.block_s:g} s a cell",
         *("loop", "load", "joined", "skipped", "p50", "p99", "p99.9", "max", "> 200 us"),
-        *("witness p99.9", "witness > 200 us", "witness skipped"),
+        *("witness p99.9", "witness > 200 us", "witness skipped", "others"),
     )
     for cell in report.cells:
         table.add_row(
@@ -169,6 +169,7 @@ def lateness(
             f"{cell.witness_us.p999:.1f}",
             f"{cell.witness_late:.2%}",
             str(cell.witness_skipped),
+            f"{cell.others:.2f}",
         )
     _show(console, table)
     table = _table(
@@ -276,6 +277,8 @@ def _histogram(counts: Sequence[int]) -> str:
 
 def _verdicts(console: Console, bars: Sequence[bench.Bar], conditions: bench.Conditions) -> None:
     _bars(console, bars)
+    for rival in conditions.rivals:
+        console.print(f"[red]another real-time program was running: {escape(rival)}[/]", soft_wrap=True)
     console.print(
         f"\n{escape(conditions.machine)}, Linux {escape(conditions.kernel)}, Python {conditions.python}; "
         f"{conditions.seconds:.0f} s, load {conditions.load_before:.2f} to {conditions.load_after:.2f}, other programs "

@@ -24,6 +24,7 @@ _REQUESTED = "red"
 _QUIET = "bright_black"
 _HISTORY_S = 1.0  # between two bars of a wall's damping
 _NARROW = 64
+_CYCLES_WIDTH = 36
 _PREFIXES = ((1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _MOST_WALLS = 4
 
@@ -289,7 +290,7 @@ def _force_box(known: Known, status: Status, width: int, height: int) -> list[Te
     titles = [f"{name} {value:+.2f}" for name, value in zip(axes, known.position.force_n, strict=False)]
     limited = known.position.force_n != known.position.force_requested_n
     styles = [_REQUESTED] * len(axes) + [_AXIS_STYLES[index % 3] for index in range(len(axes))]
-    rows = plot(known.forces, width - 4, height - 2, styles, least=1.0, marks=(0.0,))
+    rows = plot(known.forces, width - 4, height - 2, styles, least=1.0, ruling=len(axes), marks=(0.0,))
     title = _coloured(titles, " N")
     if limited:
         title = Text("limited ", style=_REQUESTED).append_text(title)
@@ -354,15 +355,15 @@ def _energy(known: Known, width: int) -> Text:
 def _logs(known: Known, width: int, rows: int) -> list[Text]:
     if width < _NARROW:
         return _box("events", Text(""), _event_rows(known, rows), width)
-    left = min(48, width // 2)
+    left = _CYCLES_WIDTH
     cycles = _box("cycles", Text(""), _cycle_rows(known, rows), left)
     return _beside(cycles, _box("events", Text(""), _event_rows(known, rows), width - left))
 
 
 def _cycle_rows(known: Known, rows: int) -> list[Text]:
-    lines = [Text(f"{'n':>6}{'wall':>5}{'time':>8}{'generated':>10}{'N s/m':>7}", style=_QUIET)]
+    lines = [Text(f"{'n':>5}{'w':>2}{'time':>8}{'generated':>10}{'N s/m':>7}", style=_QUIET)]
     for cycle in list(known.cycles)[: rows - 1]:
-        line = Text(f"{cycle.cycle:>6}{cycle.contact:>5}{si(cycle.duration_s, 's'):>8}")
+        line = Text(f"{cycle.cycle:>5}{cycle.contact:>2}{si(cycle.duration_s, 's'):>8}")
         line.append(f"{si(cycle.generated_j, 'J'):>10}", "yellow" if cycle.generated_j > 0.0 else "")
         lines.append(line.append(f"{cycle.damping_n_s_per_m:>7.1f}"))
     return (lines + [Text("")] * rows)[:rows]

@@ -32,8 +32,8 @@ def simulate(
     The numbers are the daemon's to the last bit: same driver, law, guard and tick, without the waiting. Writes a row a
     tick, the first at t = 0:
 
-      t_s, x_m, v_m_per_s (true), x_measured_m, force_n (applied), force_requested_n, energy_j (into the walls), cycle,
-      damping_n_s_per_m, in_contact
+    t_s, x_m, v_m_per_s (both true), x_measured_m, force_n (applied), force_requested_n, energy_j (into the walls),
+    cycle, damping_n_s_per_m, in_contact
 
     x is relative to the first wall and negative inside it; a positive force pushes out. The file appears when it is
     complete. The summary is of the last 0.5 s. Exits with 1 when the daemon would have stopped for a fault; the rows up

@@ -62,6 +62,7 @@ def plot(
     *,
     scale: float = 1.0,
     least: float = 1.0,
+    ruling: int = 0,
     marks: Sequence[float] = (),
 ) -> list[Text]:
     """A trace as lines of text, its axis at the left.
@@ -73,13 +74,15 @@ def plot(
         styles: one a series; later series are drawn over earlier ones.
         scale: factor from values to what the axis is labelled in.
         least: smallest range of the axis, in its own units.
+        ruling: first series that the axis must hold; those before it end at its edges.
         marks: values with a line across, always within the range, in their own units.
     """
     cells = max(1, width - LABEL_WIDTH)
     window = trace.window(2 * cells)
-    known = [(lows, highs) for entry in window if entry for lows, highs in (entry,)]
-    lowest = min([scale * min(lows) for lows, _ in known if lows] + list(marks), default=0.0)
-    highest = max([scale * max(highs) for _, highs in known if highs] + list(marks), default=0.0)
+    lows = [scale * min(entry[0][ruling:]) for entry in window if entry]
+    highs = [scale * max(entry[1][ruling:]) for entry in window if entry]
+    lowest = min([*lows, *marks], default=0.0)
+    highest = max([*highs, *marks], default=0.0)
     bottom, top = axis(lowest, highest, least)
     canvas = _Canvas(cells, height, bottom, top)
     for series in range(trace.series):
@@ -99,6 +102,7 @@ def plot(
 
 def axis(lowest: float, highest: float, least: float) -> tuple[float, float]:
     """Round ends of an axis that holds both values and is at least so long; they change seldom while values do."""
+    least = max(least, 1e-6 * max(abs(lowest), abs(highest)))  # what a float still resolves
     span = max(highest - lowest, least)
     step = 10.0 ** math.floor(math.log10(span))
     for finer in (0.2, 0.5):

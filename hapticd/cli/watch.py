@@ -24,7 +24,7 @@ from hapticd.cli.picture import SILENT_S, Known, frame, one_line
 from hapticd.client import Client, Event, Record, SilenceError, Status, connect
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, telemetry_endpoint
 
-FRAME_S = 0.08
+FRAME_S = 0.1
 """Time between two pictures [s]."""
 
 _PATIENCE_S = 3.0  # for a daemon, when one answer is all that was asked for
@@ -151,13 +151,14 @@ class _Feed:
 def _live(feed: _Feed, console: Console, stop: Callable[[], bool]) -> None:
     """Draw on the terminal's other screen until q."""
     with _keys() as pressed, Live(console=console, screen=True, auto_refresh=False) as live:
-        while not stop():
-            feed.drain()
-            width, height = console.size
-            lines = frame(feed.known, feed.endpoint, width, height, time.monotonic())
-            live.update(Group(*lines), refresh=True)
-            if "q" in pressed(FRAME_S).lower():
-                return
+        try:
+            while not stop() and "q" not in pressed(FRAME_S).lower():
+                feed.drain()
+                width, height = console.size
+                lines = frame(feed.known, feed.endpoint, width, height, time.monotonic())
+                live.update(Group(*lines), refresh=True)
+        finally:
+            live.update("", refresh=True)  # a terminal that was resized meanwhile would bring some of it back
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 """The closed loop, many times: device, one wall, law and force limit over a grid of parameters, on all cores.
 
-The order of a tick is the daemon's: move, sample, velocity, contact, law, limit, write, books. `run` is plain Python;
-a study runs it compiled, a test interpreted, and both give the daemon's numbers to the last bit.
+The order of a tick is the daemon's: move, sample, velocity, contact, law, limit, books, write. `run` is plain
+Python; a study runs it compiled, a test interpreted, and both give the daemon's numbers to the last bit. What the
+daemon does at transitions is not here: a loop that starts inside the wall has its force at once, without a ramp.
 
 Memory does not grow with the simulated time unless a trace is asked for.
 """
@@ -60,7 +61,6 @@ from hapticd.simulation.specialise import specialise
 WALL_DAMPING: bool = True
 LONG_VELOCITY: bool = True
 LIMIT: bool = True
-BLEND: bool = True
 LEDGER: bool = True
 LAW_DAMPING: bool = True
 LAW_MASS: bool = True
@@ -68,7 +68,7 @@ SETTLING: bool = True
 TRACE: bool = True
 
 FARTHEST_M = 1e6
-MOST_N = 1e12
+MOST = 1e18
 MOST_M_PER_S = 1e6
 CHUNK = 64
 TRACE_COLUMNS = ("x_m", "v_m_per_s", "x_measured_m", "force_n", "energy_j", "damping_n_s_per_m")
@@ -85,7 +85,6 @@ class Point:
         period_s: time between ticks [s].
         max_force_n: the guard's limit [N].
         velocity_samples: samples that the velocity difference spans.
-        ramp_s: the daemon blends a wall that is pressed at the first tick in over this long; 0: it does not [s].
         target_m: where it should settle; None: where hand and springs balance, known for a constant hand only [m].
         band_m: settled means within this of the target; None: 5 % of it, at least three counts [m].
     """
@@ -96,7 +95,6 @@ class Point:
     period_s: float = 1e-3
     max_force_n: float = math.inf
     velocity_samples: int = 1
-    ramp_s: float = 0.0
     target_m: float | None = None
     band_m: float | None = None
 
@@ -156,9 +154,6 @@ class LoopState:
     newest: int
     filled: int
     applied_spring_n: float
-    blend_pending: bool
-    blend_n: float
-    blend_step_n: float
     low_m: float
     high_m: float
     low_measured_m: float
@@ -179,7 +174,6 @@ class LoopParams:
     dt_s: float
     limit_n: float
     samples: int
-    ramp_ticks: int
     target_m: float
     band_m: float
     first_segment: int
@@ -277,9 +271,7 @@ def run(
             force_n = law_step(law_state, law_params, tick)
             if not tick.in_contact:
                 force_n = 0.0
-            if BLEND:
-                force_n = blended(loop, params, tick, force_n)
-            if not (-MOST_N < force_n < MOST_N):
+            if not (-MOST < force_n < MOST):
                 loop.finite = False
                 return
 
@@ -295,7 +287,7 @@ def run(
                 loop.felt_mass_kg = law_state.felt_mass_kg
             if LEDGER:
                 stored_j = 0.0
-                if x_m < 0.0 and share > 0.0:
+                if x_m < 0.0:
                     stored_j = -0.5 * spring_n * x_m
                     if LIMIT and spring_n > params.limit_n:
                         stored_j = params.limit_n * (-x_m - 0.5 * params.limit_n / stiffness)
@@ -309,7 +301,9 @@ def run(
                     loop.damping_n_s_per_m,
                     params.dt_s,
                 )
-                loop.applied_spring_n = share * spring_n
+                loop.applied_spring_n = spring_n
+                if LIMIT and spring_n > params.limit_n:
+                    loop.applied_spring_n = params.limit_n
             tick.applied_n = share * force_n
             tick.applied_contact_n = share * tick.contact_n
             loop.force_n = tick.applied_n
@@ -346,23 +340,6 @@ def long_difference(loop: Any, params: Any, history: Any, position_m: float) -> 
     oldest = (loop.newest + 1 - loop.filled + size) % size
     span_s = history.time_s[loop.newest] - history.time_s[oldest]
     return (position_m - history.position_m[oldest]) / span_s  # type: ignore[no-any-return]
-
-
-def blended(loop: Any, params: Any, tick: Any, force_n: float) -> float:
-    """The daemon's hand-over when it is armed: a wall already pressed comes in from the force applied before."""
-    if not tick.in_contact:
-        loop.blend_pending = False
-        loop.blend_n = 0.0
-    elif loop.blend_pending:
-        loop.blend_pending = False
-        loop.blend_n = tick.applied_n - force_n
-        loop.blend_step_n = loop.blend_n / params.ramp_ticks
-        force_n = force_n + loop.blend_n
-    elif loop.blend_n != 0.0:
-        left_n = loop.blend_n - loop.blend_step_n
-        loop.blend_n = left_n if left_n * loop.blend_step_n > 0.0 else 0.0
-        force_n = force_n + loop.blend_n
-    return force_n
 
 
 def report(plant: Any, loop: Any) -> None:
@@ -428,7 +405,6 @@ class Batch:
             "WALL_DAMPING": any(segment["damping_n_s_per_m"] for one in self._prepared for segment in one.segments),
             "LONG_VELOCITY": any(point.velocity_samples > 1 for point in points),
             "LIMIT": any(point.max_force_n < math.inf for point in points),
-            "BLEND": any(point.ramp_s > 0.0 for point in points),
             "LEDGER": ledger,
             "LAW_DAMPING": "damping_n_s_per_m" in state_names,
             "LAW_MASS": "felt_mass_kg" in state_names,
@@ -559,6 +535,7 @@ class _Prepared:
         self.law_state = {name: kind(getattr(law_state, name)) for name, kind in state_fields(law).items()}
         tick = LawTick(device.resolution_m)
         tick.x_m = start_m
+        tick.dt_s = period_s
         self.tick = _fields(tick)
         self.segments = self._segments(point, [first for first, _ in changes])
         target_m = point.target_m if point.target_m is not None else self._balance_m(point)
@@ -569,7 +546,6 @@ class _Prepared:
             "dt_s": period_s,
             "limit_n": float(point.max_force_n),
             "samples": point.velocity_samples,
-            "ramp_ticks": max(1, round(point.ramp_s / period_s)),
             "target_m": target_m,
             "band_m": band_m,
             "first_segment": 0,
@@ -579,7 +555,6 @@ class _Prepared:
         self.loop: dict[str, Any] = {name: kind(0) for name, kind in _hints(LoopState).items()} | {
             "last_m": start_m,
             "filled": 1,
-            "blend_pending": point.ramp_s > 0.0,
             "low_m": math.inf,
             "high_m": -math.inf,
             "low_measured_m": math.inf,

@@ -7,6 +7,7 @@ advances by one period a tick whatever the host does.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -119,12 +120,14 @@ class OfflineRun:
                 f'{loaded.path}: device.driver = "{device}": only a simulated device runs offline, such as "loopback"'
             )
         if loaded.options.clock != "ticks":
-            raise ConfigError(f'{loaded.path}: device.options.clock = "{loaded.options.clock}": must be "ticks" offline')
+            raise ConfigError(
+                f'{loaded.path}: device.options.clock = "{loaded.options.clock}": must be "ticks" offline'
+            )
         self._driver = loaded.driver(loaded.options, self.period_s)
         place_device(loaded, self._driver)
         self._driver.open()
         # The true position is nobody's business but a study's, so no driver publishes it.
-        self._model: SimulatedDevice = self._driver._device
+        self._model: SimulatedDevice = vars(self._driver)["_device"]
         try:
             self._tick = make_tick(loaded, self._driver.info)
         except BaseException:
@@ -137,13 +140,18 @@ class OfflineRun:
         Args:
             take: is given every row.
             progress: is told now and then how many ticks are done.
+
+        Raises:
+            DriverError: there was not even a first tick.
         """
-        window = _Window(min(self.ticks, max(1, round(WINDOW_S / self.period_s))), self.ticks)
+        window = _Window(max(1, round(WINDOW_S / self.period_s)))
         for row in self._rows():
             take(row)
             window.enter(row)
             if progress is not None and window.ticks % PROGRESS_TICKS == 0:
                 progress(window.ticks)
+        if not window.ticks:
+            raise DriverError(self.fault or "the device gave no sample")
         return window.summary(self._tick, self.period_s, self.fault)
 
     def _rows(self) -> Iterator[Row]:
@@ -186,40 +194,36 @@ class OfflineRun:
 
 
 class _Window:
-    """Sums over the end of a run, so that no row need be kept."""
+    """The last rows, whenever the run ends."""
 
-    def __init__(self, length: int, ticks: int) -> None:
+    def __init__(self, length: int) -> None:
         self.ticks = 0
-        self._from = ticks - length
-        self._length = length
-        self._rows: list[Row] = []
+        self._rows: deque[Row] = deque(maxlen=length)
         self._peak_n = 0.0
-        self._last: Row | None = None
 
     def enter(self, row: Row) -> None:
-        self._peak_n = max(self._peak_n, abs(row.force_n))
-        if self.ticks >= self._from:
-            self._rows.append(row)
-        self._last = row
         self.ticks += 1
+        self._rows.append(row)
+        if not -self._peak_n <= row.force_n <= self._peak_n:
+            self._peak_n = abs(row.force_n)
 
     def summary(self, tick: ControlTick, period_s: float, fault: str | None) -> Summary:
-        rows = self._rows or ([self._last] if self._last else [])
-        true_m = [row.x_m for row in rows] or [math.nan]
-        measured_m = [row.x_measured_m for row in rows] or [math.nan]
-        inside = [row for row in rows if row.in_contact]
+        true_m = [row.x_m for row in self._rows]
+        measured_m = [row.x_measured_m for row in self._rows]
+        inside = [row for row in self._rows if row.in_contact]
         ledgers = [contact.ledger for contact in tick.contacts]
+        last = self._rows[-1]
         return Summary(
             ticks=self.ticks,
-            window_s=len(rows) * period_s,
+            window_s=len(self._rows) * period_s,
             peak_to_peak_m=max(true_m) - min(true_m),
             measured_peak_to_peak_m=max(measured_m) - min(measured_m),
             mean_depth_m=-sum(true_m) / len(true_m),
             displayed_stiffness_n_per_m=_stiffness(inside, [row.x_m for row in inside]),
             measured_stiffness_n_per_m=_stiffness(inside, [row.x_measured_m for row in inside]),
             commanded_stiffness_n_per_m=tick.contacts[0].wall.stiffness_n_per_m if tick.contacts else None,
-            cycles=self._last.cycle if self._last else 0,
-            damping_n_s_per_m=self._last.damping_n_s_per_m if self._last else 0.0,
+            cycles=last.cycle,
+            damping_n_s_per_m=last.damping_n_s_per_m,
             peak_force_n=self._peak_n,
             energy_j=sum(ledger.energy_j for ledger in ledgers),
             generated_j=sum(ledger.generated_j for ledger in ledgers),

@@ -58,6 +58,7 @@ class TraceFile(ABC):
     def _create(self) -> IO[Any]:
         return self._part.open("xb")
 
+    @abstractmethod
     def _finish(self) -> None:
         """Write what is left."""
 
@@ -71,6 +72,9 @@ class CsvTrace(TraceFile):
             self._file.write(",".join(map(repr, row)) + "\n")
         except OSError as failed:
             raise HapticdError(f"{self.path}: cannot be written: {failed.strerror}") from failed
+
+    def _finish(self) -> None:
+        self._file.flush()
 
     def _create(self) -> IO[Any]:
         file = self._part.open("x", encoding="ascii", newline="")
@@ -104,7 +108,8 @@ class NpzTrace(TraceFile):
         self._count = at + 1
 
     def _finish(self) -> None:
-        self._np.savez(self._file, **{name: column[: self._count] for name, column in self._columns.items()})
+        columns: dict[str, Any] = {name: column[: self._count] for name, column in self._columns.items()}
+        self._np.savez(self._file, **columns)
 
 
 def open_trace(path: Path, rows: int, overwrite: bool) -> TraceFile:
@@ -153,7 +158,9 @@ def _check_room(path: Path, rows: int) -> None:
             "a .csv is written tick by tick"
         )
     if bytes_needed > (free := shutil.disk_usage(path.parent).free):
-        raise ConfigError(f"{path}: {rows} ticks take about {_size(bytes_needed)} and {_size(free)} of the disk are free")
+        raise ConfigError(
+            f"{path}: {rows} ticks take about {_size(bytes_needed)} and {_size(free)} of the disk are free"
+        )
 
 
 def _free_memory() -> int:

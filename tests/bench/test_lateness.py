@@ -7,11 +7,12 @@ import os
 import shutil
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from hapticd.bench import Quantiles, Verdict, lateness
+from hapticd.bench import Quantiles, Verdict, doubtful, lateness, watch_machine
 from hapticd.bench.lateness import Block, Cell, Load, Loop
 from hapticd.bench.threaded import serve_threaded
 from hapticd.bench.tick import RecordedLoop, scene, serve_daemon
@@ -171,6 +172,14 @@ class TestNegativeControl:
     def test_says_nothing_when_the_machine_was_restless(self) -> None:
         cells = [cell("C", a_loop(), 300.0), cell("thread", a_loop(p99=5000.0), 300.0)]
         assert lateness.judge_control(lateness.judge(cells, "thread")).verdict == "INCONCLUSIVE"
+
+
+def test_beside_another_real_time_program_nothing_is_judged() -> None:
+    """Two loops of one priority on one processor wait for each other, at every millisecond."""
+    bars = lateness.judge([cell("C", a_loop()), cell("daemon", a_loop(p50=50.0))], "daemon")
+    calm = watch_machine()()
+    assert doubtful(bars, replace(calm, rivals=())) == bars
+    assert {bar.verdict for bar in doubtful(bars, replace(calm, rivals=("42 other",)))} == {"INCONCLUSIVE"}
 
 
 def test_every_cell_gets_as_many_blocks() -> None:

@@ -41,6 +41,10 @@ def step(state, params, tick):
 '''
 
 
+Report = Callable[[str, object], None]
+"""pytest's record_property: how long a reaction took, for `pytest --junit-xml`; machines differ, so nothing asserts it."""
+
+
 def pressing(daemon: Daemon) -> None:
     """Return when the daemon holds a force against the hand."""
     with Subscriber(daemon.endpoint, "hapticd/position") as subscriber:
@@ -58,7 +62,7 @@ def nothing_left(daemon: Daemon) -> bool:
     return not list(directory.iterdir()) and not daemon.control_pid()
 
 
-def test_a_killed_supervisor_takes_the_force_with_it(record_property: Callable[[str, object], None]) -> None:
+def test_a_killed_supervisor_takes_the_force_with_it(record_property: Report) -> None:
     with Daemon(PRESSED).wait_ready() as daemon:
         pressing(daemon)
         memory = daemon.memory()
@@ -114,23 +118,30 @@ def test_a_supervisor_that_sleeps_for_a_while_costs_the_loop_nothing() -> None:
         assert status["armed"]
 
 
-def test_a_killed_control_process_ends_the_service() -> None:
+def test_a_killed_control_process_ends_the_service(record_property: Report) -> None:
     with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
         pressing(daemon)
-        os.kill(daemon.control_pid(), signal.SIGKILL)
+        pid = daemon.control_pid()
+        killed_ns = time.monotonic_ns()
+        os.kill(pid, signal.SIGKILL)
         event = subscriber.until("hapticd/event", code=EventCode.CONTROL_LOST)
+        record_property("device_released_after_ms", (time.monotonic_ns() - killed_ns) * 1e-6)
         assert "killed by signal 9" in event["text"]
         assert "without force" in event["text"]
         assert daemon.wait_exit() == 1
         assert nothing_left(daemon)
 
 
-def test_a_stopped_control_process_is_killed_and_the_device_released() -> None:
+def test_a_stopped_control_process_is_killed_and_the_device_released(record_property: Report) -> None:
     with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
         pressing(daemon)
         pid = daemon.control_pid()
+        stopped_ns = time.monotonic_ns()
         os.kill(pid, signal.SIGSTOP)
+        wait_until(lambda: gone(pid), "the control process to be killed")
+        record_property("killed_after_ms", (time.monotonic_ns() - stopped_ns) * 1e-6)
         event = subscriber.until("hapticd/event", code=EventCode.CONTROL_LOST)
+        record_property("device_released_after_ms", (time.monotonic_ns() - stopped_ns) * 1e-6)
         assert "stood still" in event["text"]
         assert daemon.wait_exit() == 1
         assert gone(pid)
@@ -150,13 +161,14 @@ def test_an_endless_law_is_a_stalled_control_process(tmp_path: Path) -> None:
         assert nothing_left(daemon)
 
 
-def test_sigterm_ramps_the_force_out_and_ends_well() -> None:
+def test_sigterm_ramps_the_force_out_and_ends_well(record_property: Report) -> None:
     with Daemon(PRESSED).wait_ready() as daemon:
         pressing(daemon)
         memory = daemon.memory()
         told_ns = time.monotonic_ns()
         daemon.process.send_signal(signal.SIGTERM)
         assert daemon.wait_exit() == 0
+        record_property("exit_after_ms", (time.monotonic_ns() - told_ns) * 1e-6)
         after = [record for record in all_records(memory) if record.deadline_ns > told_ns]
         assert after[-1].force_n == (0.0,)
         assert sum(0.0 < record.force_n[0] < 2.9 for record in after) > 20

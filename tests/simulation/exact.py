@@ -78,7 +78,14 @@ def period_with_friction(
             v = acceleration * nudge
             x += 0.5 * acceleration * nudge * nudge
         answer = solve_ivp(
-            motion, (t + nudge, period), [x, v], "DOP853", rtol=1e-13, atol=1e-18, events=standstill, max_step=period / 8
+            motion,
+            (t + nudge, period),
+            [x, v],
+            "DOP853",
+            rtol=1e-13,
+            atol=1e-18,
+            events=standstill,
+            max_step=period / 8,
         )
         x, v = float(answer.y[0, -1]), float(answer.y[1, -1])
         t = float(answer.t[-1])

@@ -41,7 +41,7 @@ def test_the_step_is_exact_for_any_damping_and_spring(beta: float, omega: float,
     truth = exact.flow(decay, stiffness, time)
     found = flow(decay, stiffness, time)
     # An angle of omega radians is known to omega * 1e-16 at best.
-    tolerance = Decimal(2e-14 * max(1.0, omega))
+    tolerance = Decimal(str(2e-14 * max(1.0, omega)))
     for value, true, scale in zip(found, truth, (1.0, min(time, 1.0), min(time * time, 1.0)), strict=True):
         # relative where the motion is monotone, relative to the undamped size where it oscillates or dies out
         size = max(abs(true), Decimal(scale) * truth_scale(beta, omega))
@@ -52,7 +52,7 @@ def truth_scale(beta: float, omega: float) -> Decimal:
     """Below this share of t (or t^2, or 1) an oscillation may cross zero, and relative accuracy has no meaning."""
     if omega * 2.0 > beta and omega > 0.5:
         return Decimal(1.0 / omega**2)
-    return Decimal(1e-16)
+    return Decimal("1e-16")
 
 
 @pytest.mark.parametrize("damping", [-200.0, -1.0, 0.5, 2.0])
@@ -111,7 +111,7 @@ def test_friction_holds_any_force_up_to_its_own_for_ever() -> None:
 
 
 def test_a_sliding_device_stops_where_its_energy_is_used_up() -> None:
-    """m v^2 / 2 = f_c s, with the last period stopped in its middle and not at its end."""
+    """Its way s is m v^2 / 2 = f_c s, with the last period stopped in its middle and not at its end."""
     mover = device(mass_kg=0.5, coulomb_n=2.0, initial_velocity_m_per_s=0.1234)
     for _ in range(200):
         mover.advance(0.0)
@@ -122,9 +122,7 @@ def test_a_sliding_device_stops_where_its_energy_is_used_up() -> None:
 def test_a_spring_with_friction_stops_off_centre_after_the_textbook_half_swings() -> None:
     """Each half swing loses 2 f_c / k of amplitude; it sticks once |x| <= f_c / k."""
     k, coulomb = 400.0, 0.5
-    mover = device(
-        mass_kg=0.2, coulomb_n=coulomb, initial_position_m=0.0107, hand={"stiffness_n_per_m": k}
-    )
+    mover = device(mass_kg=0.2, coulomb_n=coulomb, initial_position_m=0.0107, hand={"stiffness_n_per_m": k})
     for _ in range(2000):
         mover.advance(0.0)
     amplitude = 0.0107
@@ -252,9 +250,7 @@ def test_each_hand_profile_is_the_function_that_it_names() -> None:
         assert forces == pytest.approx(truth, abs=1e-9)
 
     expect({"profile": "constant", "newton": -3}, lambda t: -3.0)
-    expect(
-        {"profile": "step", "newton": -3, "from_newton": 1, "at_s": 0.2}, lambda t: -3.0 if t >= 0.2 - 1e-9 else 1.0
-    )
+    expect({"profile": "step", "newton": -3, "from_newton": 1, "at_s": 0.2}, lambda t: -3.0 if t >= 0.2 - 1e-9 else 1.0)
     expect(
         {"profile": "ramp", "newton": -3, "from_newton": 1, "at_s": 0.2, "duration_s": 0.5},
         lambda t: float(np.interp(t, [0.2, 0.7], [1.0, -3.0])),
@@ -319,7 +315,11 @@ def test_a_change_comes_at_the_first_period_at_or_after_its_time() -> None:
 def test_a_term_that_is_not_there_is_not_executed() -> None:
     bare = device()._move.__code__
     full = device(
-        coulomb_n=0.1, force_delay_samples=1, bandwidth_hz=100.0, max_force_n=1.0, hand=pressed(1.0, stiffness_n_per_m=1)
+        coulomb_n=0.1,
+        force_delay_samples=1,
+        bandwidth_hz=100.0,
+        max_force_n=1.0,
+        hand=pressed(1.0, stiffness_n_per_m=1),
     )._move.__code__
     assert len(bare.co_code) < len(full.co_code) / 2
     assert not {"hand_force", "slide"} & set(bare.co_names)
@@ -363,7 +363,10 @@ anything = st.fixed_dictionaries(
         "initial_position_m": st.floats(-1e3, 1e3),
         "initial_velocity_m_per_s": st.floats(-1e3, 1e3),
         "hand": st.fixed_dictionaries(
-            {"force": st.just({"profile": "press-and-release"}) | st.just({"profile": "sine", "newton": 2, "frequency_hz": 9.9})},
+            {
+                "force": st.just({"profile": "press-and-release"})
+                | st.just({"profile": "sine", "newton": 2, "frequency_hz": 9.9})
+            },
             optional={"mass_kg": small, "damping_n_s_per_m": small, "stiffness_n_per_m": small},
         ),
     },
@@ -375,8 +378,10 @@ anything = st.fixed_dictionaries(
 def test_finite_goes_in_and_finite_comes_out(keys: dict[str, Any], period: float, forces: list[float]) -> None:
     try:
         mover = SimulatedDevice(SimulationOptions.model_validate(keys), period)
-    except ValueError as error:
-        assert "hand.stiffness_n_per_m" in str(error)
+    except ValueError:
+        # Only one thing is refused: a hand that swings many times within a period, where there is friction.
+        assert keys["coulomb_n"] > 0.0
+        assert keys["hand"]["stiffness_n_per_m"] > 0.0
         return
     limit = mover.options.max_force_n or math.inf
     for force in itertools.islice(itertools.cycle(forces), 30):

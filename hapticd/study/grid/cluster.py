@@ -1,0 +1,79 @@
+"""Blocks of a study on the workers of an existing dask scheduler; a worker that dies costs time and no result."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+
+from distributed import CancelledError, Client, KilledWorker, as_completed, get_worker
+
+from hapticd.contracts.errors import ConfigError, HapticdError
+from hapticd.study.grid.job import Job, Work, code_digest
+from hapticd.study.grid.journal import Row
+
+_ANSWERS_WITHIN_S = 15
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def blocks(address: str, job: Job, wanted: Sequence[int]) -> Iterator[tuple[int, list[Row]]]:
+    """Do blocks on a cluster; they come as they are finished.
+
+    dask does again elsewhere whatever was lost with a worker.
+
+    Args:
+        address: of the scheduler, `tcp://host:8786`.
+        job: the study.
+        wanted: numbers of the blocks.
+
+    Raises:
+        ConfigError: no such address, or nobody works there.
+        HapticdError: the scheduler is gone, or the workers cannot do it.
+    """
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here in one line
+    try:
+        client = Client(address, timeout=_ANSWERS_WITHIN_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"--cluster {address}: no dask scheduler answers there ({_first_line(error)})") from None
+    with closing(client):
+        try:
+            client.wait_for_workers(1, timeout=_ANSWERS_WITHIN_S)
+        except TimeoutError:
+            raise ConfigError(f"--cluster {address}: the scheduler has no workers; start some: dask worker {address}") from None
+        digest = code_digest(job.work, job.laws)
+        futures = {
+            client.submit(_block, job.work, job.spec, block, job.laws, digest, pure=False): block for block in wanted
+        }
+        try:
+            for future in as_completed(list(futures)):
+                block = futures.pop(future)  # and with it the worker's copy of the rows
+                yield block, future.result()
+        except HapticdError:
+            raise
+        except KilledWorker as error:
+            raise HapticdError(f"--cluster {address}: gave up on a block that killed its workers: {error}") from None
+        except (OSError, CancelledError) as error:
+            raise HapticdError(
+                f"--cluster {address}: lost the scheduler ({_first_line(error)}); finished cells are kept, the same "
+                "command goes on from there"
+            ) from None
+        except ImportError as error:
+            raise HapticdError(
+                f"--cluster {address}: a worker lacks a module: {error}; install the same hapticd[study] on every worker"
+            ) from None
+
+
+def _block(work: Work, spec: object, block: int, laws: tuple[str, ...], digest: str) -> list[Row]:
+    """One block on a worker; the engine has threads of its own, so only one block at a time in a process."""
+    worker = get_worker()
+    if code_digest(work, laws) != digest:
+        raise HapticdError(
+            f"worker {worker.address} has another hapticd or another law of that name: install the same everywhere"
+        )
+    with _ONE_AT_A_TIME:
+        return work(spec, block, worker.state.nthreads)
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).partition("\n")[0] or type(error).__name__

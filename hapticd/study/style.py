@@ -1,0 +1,72 @@
+"""How the figures of the studies look: one hand, units at the axes, legible in print and without colour."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+INK = "#1b1f24"
+GRID = "#d9dde2"
+BLUE = "#2f6f9f"
+ORANGE = "#d9822b"
+SAND = "#e9c46a"
+PALE = "#eceff2"
+GREY = "#a7afb8"
+
+SERIES = ("#2f6f9f", "#d9822b", "#4d8f5b", "#8c5aa8", "#b5483f", "#6b7684")
+"""For curves, in this order; they differ in lightness as well."""
+
+RC = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.labelsize": 9.5,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.6,
+    "savefig.dpi": 160,
+}
+
+
+def figure(width_in: float, height_in: float, rows: int = 1, columns: int = 1, **layout: Any) -> tuple[Figure, Any]:
+    """A figure with axes, without a window.  -> figure and a 2-d array of axes."""
+    with mpl.rc_context(RC):
+        drawn = Figure(figsize=(width_in, height_in), layout="constrained")
+        FigureCanvasAgg(drawn)
+        return drawn, drawn.subplots(rows, columns, squeeze=False, **layout)
+
+
+def png(drawn: Figure) -> bytes:
+    """The figure as a file; the same figure gives the same bytes."""
+    picture = io.BytesIO()
+    with mpl.rc_context(RC):
+        drawn.savefig(picture, format="png", metadata={"Software": None})
+    return picture.getvalue()
+
+
+def note(axes: Axes, text: str) -> None:
+    """A remark in the upper right corner of a plot."""
+    axes.text(
+        0.98, 0.98, text, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2.0},
+    )  # fmt: skip

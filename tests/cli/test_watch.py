@@ -1,0 +1,415 @@
+"""`hapticd watch` in a real terminal of 80 x 24, fed by a real publisher."""
+
+from __future__ import annotations
+
+import fcntl
+import itertools
+import json
+import os
+import pty
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pyte
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hapticd.bench.telemetry import synthetic_records
+from hapticd.cli import main
+from hapticd.cli.picture import Known, frame, late_ticks, one_line, si
+from hapticd.cli.trace import SLICE_S, Trace, axis, bars, plot
+from hapticd.client import Cycle, Damping, Energy, Event, Position, Status
+from hapticd.contracts import event as contract
+from hapticd.telemetry.status import LateHistogram
+from tests.telemetry.sockets import PATIENCE_S, Wire
+
+HAPTICD = str(Path(sys.executable).with_name("hapticd"))
+HISTOGRAM = (9000, 400, 30, 12, 0, 5, 0, 2, 0, 0, 0, 0)
+STATUS = Status(
+    version="1.2.3",
+    instance="default",
+    rate_hz=1000.0,
+    measured_rate_hz=999.8,
+    late_histogram=HISTOGRAM,
+    late_max_us=1912.0,
+    overruns=3,
+    armed=True,
+    law="energy-cycle",
+    driver="loopback",
+    device="omega7",
+    simulated=True,
+    axes=("z",),
+    wall_axis=("z",),
+    wall_position_m=(0.0,),
+    wall_stiffness_n_per_m=(12000.0,),
+    config_hash="3fa9c2d1",
+    warnings=("not real-time: no right to SCHED_FIFO",),
+)
+
+
+class Feed:
+    """A publisher that is fed with synthetic ticks in real time by whoever waits for something."""
+
+    def __init__(self, wire: Wire) -> None:
+        self.wire = wire
+        self.paused = False
+        self._records = synthetic_records(0)
+        self._start_s = time.monotonic()
+        self._published = 0
+        self._status_due_s = 0.0
+
+    def turn(self) -> None:
+        now_s = time.monotonic()
+        if self.paused or self.wire.publisher._socket.closed:
+            return
+        due = int((now_s - self._start_s) * 1000) - self._published
+        self.wire.publisher.publish(list(itertools.islice(self._records, max(0, due))))
+        self._published += max(0, due)
+        if now_s > self._status_due_s:
+            self._status_due_s = now_s + 1.0
+            self.wire.publisher.status(STATUS.as_map())
+
+
+class Terminal:
+    """A terminal emulator with `hapticd watch` in it."""
+
+    def __init__(self, feed: Feed, *arguments: str, columns: int = 80, rows: int = 24) -> None:
+        self.feed = feed
+        self.screen = pyte.Screen(columns, rows)
+        self._stream = pyte.ByteStream(self.screen)
+        self._outside, self._inside = pty.openpty()
+        self.resize(columns, rows)
+        self.settings = termios.tcgetattr(self._inside)
+        self.written = b""
+        environment = {**os.environ, "TERM": "xterm-256color", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"}
+        for name in ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
+            environment.pop(name, None)
+        self.process = subprocess.Popen(
+            ["setsid", "--ctty", HAPTICD, "watch", *arguments],  # a terminal of its own, so that Ctrl-C reaches it
+            stdin=self._inside, stdout=self._inside, stderr=self._inside, env=environment,
+        )  # fmt: skip
+
+    def __enter__(self) -> Terminal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        os.close(self._outside)
+        os.close(self._inside)
+
+    @property
+    def lines(self) -> list[str]:
+        return [line.rstrip() for line in self.screen.display]
+
+    @property
+    def text(self) -> str:
+        return "\n".join(self.lines)
+
+    def resize(self, columns: int, rows: int) -> None:
+        fcntl.ioctl(self._outside, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        self.screen.resize(rows, columns)
+
+    def type(self, keys: bytes) -> None:
+        os.write(self._outside, keys)
+
+    def wait_for(self, condition: Callable[[], bool], what: str) -> None:
+        """Feed the publisher and read the terminal until something is to be seen."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < end_s, f"waited in vain for {what} in:\n{self.text}"
+            self.read()
+
+    def shows(self, *texts: str) -> None:
+        self.wait_for(lambda: all(text in self.text for text in texts), " and ".join(texts))
+
+    def read(self) -> None:
+        self.feed.turn()
+        if select.select([self._outside], [], [], 0.01)[0]:
+            chunk = os.read(self._outside, 65536)
+            self.written += chunk
+            self._stream.feed(chunk)
+
+    def ended(self) -> int:
+        """Exit code; by then the terminal must be as it was found."""
+        self.wait_for(lambda: self.process.poll() is not None, "the end")
+        while select.select([self._outside], [], [], 0.05)[0]:
+            self.read()
+        assert termios.tcgetattr(self._inside) == self.settings
+        assert self.written.rfind(b"\x1b[?1049l") > self.written.rfind(b"\x1b[?1049h")
+        assert self.written.rfind(b"\x1b[?25h") > self.written.rfind(b"\x1b[?25l")
+        return self.process.wait()
+
+
+@pytest.fixture
+def feed() -> Iterator[Feed]:
+    with Wire(say_status=False) as wire:
+        yield Feed(wire)
+
+
+def has_trace(terminal: Terminal) -> bool:
+    return sum(0x2800 < ord(character) < 0x2900 for character in terminal.text) > 40
+
+
+def test_one_screen_says_all_that_matters(feed: Feed) -> None:
+    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+        terminal.shows("hapticd default")
+        feed.wire.publisher.event(contract.Event(103, "law none -> energy-cycle", 1, 0))
+        feed.wire.publisher.event(contract.Event(204, "device lost", 1, 0))
+        terminal.shows("✗ device lost", "· law none -> energy-cycle")
+        terminal.wait_for(lambda: has_trace(terminal), "traces")
+        terminal.shows("111 ms", "kg")
+        header, warning, loop, boxes, *_, footer = terminal.lines
+        assert header.split() == [
+            *("hapticd", "default", "omega7", "loopback,", "simulated"),
+            *("law", "energy-cycle", "ARMED"),
+        ]
+        assert "⚠ not real-time: no right to SCHED_FIFO" in warning
+        assert "999.8 of 1000 Hz" in loop
+        assert "max 1.91 ms" in loop
+        assert "late ticks 7" in loop
+        assert "skipped 3" in loop
+        assert " position " in boxes
+        assert " mm ╮" in boxes
+        assert " force " in boxes
+        assert boxes.endswith(" N ╮")
+        assert "quit" in footer
+        (wall,) = (line for line in terminal.lines if line.startswith(" wall"))
+        assert "wall 0 z 12.0 kN/m" in wall
+        assert "felt mass 0.253 kg" in wall
+        (energy,) = (line for line in terminal.lines if line.startswith(" energy"))
+        assert all(word in energy for word in ("in ", "springs", "dissipated", "generated"))
+        assert len(terminal.lines) == 24
+
+
+def test_q_ends_it(feed: Feed) -> None:
+    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+        terminal.shows("hapticd default")
+        terminal.type(b"q")
+        assert terminal.ended() == 0
+
+
+def test_an_interrupt_ends_it(feed: Feed) -> None:
+    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+        terminal.shows("hapticd default")
+        terminal.type(b"\x03")
+        assert terminal.ended() == 0
+
+
+def test_a_termination_ends_it_and_gives_the_terminal_back(feed: Feed) -> None:
+    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+        terminal.shows("hapticd default")
+        terminal.process.send_signal(signal.SIGTERM)
+        assert terminal.ended() == 0
+
+
+def test_it_waits_for_a_daemon_and_finds_it_again_after_a_restart(feed: Feed) -> None:
+    feed.wire.publisher.close()
+    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+        terminal.shows("waiting for a daemon", feed.wire.endpoint, "hapticd run")
+        feed.wire.restart()
+        terminal.shows("hapticd default", "ARMED")
+        feed.paused = True
+        terminal.shows("NO DATA FOR")
+        feed.paused = False
+        feed.wire.restart()
+        terminal.wait_for(lambda: "ARMED" in terminal.lines[0], "the restarted daemon")
+
+
+def test_an_instance_is_found_where_its_daemon_comes_up(feed: Feed, monkeypatch: pytest.MonkeyPatch) -> None:
+    (feed.wire.directory / "lab").mkdir()
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(feed.wire.directory))
+    with Terminal(feed, "--instance", "lab") as terminal:
+        terminal.shows("waiting for a daemon", f"{feed.wire.directory}/lab/telemetry")
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(50, 18), (132, 43)])
+def test_it_fills_whatever_size_the_terminal_has(feed: Feed, columns: int, rows: int) -> None:
+    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+        terminal.shows("hapticd default")
+        terminal.resize(columns, rows)
+        terminal.screen.reset()
+        terminal.wait_for(lambda: has_trace(terminal) and "quit" in terminal.lines[-1], "the new size")
+        assert terminal.lines[0].endswith("ARMED")
+        assert len(terminal.screen.display[0]) == columns
+
+
+def plain(feed: Feed, *arguments: str, until: Callable[[str], bool], **environment: str) -> str:
+    """What is printed when the output is no terminal, up to where enough has come."""
+    process = subprocess.Popen(
+        [HAPTICD, "watch", "--endpoint", feed.wire.endpoint, *arguments],
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, **environment},
+    )  # fmt: skip
+    assert process.stdout is not None
+    printed = b""
+    end_s = time.monotonic() + PATIENCE_S
+    while not until(printed.decode()):
+        assert time.monotonic() < end_s, f"waited in vain, got: {printed.decode()}"
+        feed.turn()
+        if select.select([process.stdout], [], [], 0.01)[0]:
+            chunk = os.read(process.stdout.fileno(), 65536)
+            printed += chunk
+            if not chunk:
+                break
+    process.send_signal(signal.SIGTERM)
+    process.stdout.close()
+    process.wait()
+    return printed.decode()
+
+
+def test_without_a_terminal_it_prints_a_line_a_second(feed: Feed) -> None:
+    lines = plain(feed, until=lambda printed: printed.count("\n") >= 2).splitlines()
+    assert "\x1b" not in lines[0]
+    assert "armed     energy-cycle  999.8 Hz  late 7  skipped 3  z " in lines[0]
+    assert lines[0].count(" mm ") == 1
+
+
+def test_without_a_terminal_it_says_that_it_waits(feed: Feed) -> None:
+    feed.wire.publisher.close()
+    assert plain(feed, until=lambda printed: "\n" in printed) == f"waiting for a daemon on {feed.wire.endpoint}\n"
+
+
+def test_once_prints_one_picture(feed: Feed) -> None:
+    printed = plain(feed, "--once", until=lambda _: False, COLUMNS="80")
+    lines = printed.splitlines()
+    assert len(lines) == 24
+    assert max(map(len, lines)) <= 80
+    assert "ARMED" in lines[0]
+    assert "position" in printed
+
+
+def test_once_without_a_daemon_fails_with_one_line(
+    feed: Feed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    feed.wire.publisher.close()
+    monkeypatch.setattr("hapticd.cli.watch._PATIENCE_S", 0.1)
+    with pytest.raises(SystemExit) as ended:
+        main(["watch", "--once", "--endpoint", feed.wire.endpoint])
+    assert ended.value.code == 1
+    text = f"hapticd: {feed.wire.endpoint}: no daemon answers; start one with `hapticd run`\n"
+    assert capsys.readouterr().err == text
+
+
+def test_json_is_a_line_a_status(feed: Feed) -> None:
+    printed = plain(feed, "--json", until=lambda text: text.count("\n") >= 2)
+    for line in printed.splitlines()[:2]:
+        status: dict[str, Any] = json.loads(line)
+        assert status["late_histogram"] == list(HISTOGRAM)
+        assert status["warnings"] == list(STATUS.warnings)
+    assert json.loads(plain(feed, "--json", "--once", until=lambda _: False))["law"] == "energy-cycle"
+
+
+NUMBERS = st.floats(-1e300, 1e300) | st.floats(-1.0, 1.0)
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    width=st.integers(1, 200),
+    height=st.integers(1, 60),
+    axes=st.integers(1, 3),
+    walls=st.integers(0, 8),
+    numbers=st.lists(NUMBERS, min_size=1, max_size=40),
+    flags=st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans()),
+    warnings=st.lists(st.text(), max_size=4),
+)
+def test_whatever_is_known_the_picture_has_the_size_of_the_terminal(
+    width: int, height: int, axes: int, walls: int, numbers: list[float], flags: tuple[bool, ...], warnings: list[str]
+) -> None:
+    known = Known()
+    armed, fallback, latched, told = flags
+    if told:
+        texts = tuple(" ".join(one.split()) for one in warnings)
+        known.take([Status(armed=armed, fallback=fallback, latched=latched, warnings=texts, axes=("x",) * axes)], 0.0)
+    for index, number in enumerate(numbers):
+        vector, at_s = (number,) * axes, index * 0.03
+        known.take([Position(at_s, index, vector, vector, vector, (numbers[0],) * axes)], 0.0)
+        known.take([Energy(at_s, index, number, number, number, number)], 0.0)
+        known.take([Damping(at_s, index, (number,) * walls, (armed,) * walls, (number,) * walls)], 0.0)
+        known.take([Cycle(at_s, index, 0, index, number, number, number, number)], 0.0)
+        known.take([Event(at_s, index, 100 * index % 400, "text " * (index % 9))], 0.0)
+    lines = frame(known, "ipc:///run/hapticd/default/telemetry", width, height, 1.0)
+    assert [line.cell_len for line in lines] == [width] * height
+
+
+def test_a_latched_fault_says_how_to_go_on() -> None:
+    known = Known()
+    known.take([Status(latched=True, law="tdpa")], 0.0)
+    text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
+    assert "LATCHED" in text
+    assert "hapticd clear" in text
+
+
+def test_late_ticks_are_those_of_160_us_and_more() -> None:
+    histogram = LateHistogram()
+    for late_us in (0.0, 159.0, 160.0, 161.0, 20000.0):
+        histogram.add(late_us)
+    assert late_ticks(Status(late_histogram=tuple(histogram.counts))) == 3
+    assert late_ticks(Status()) == 0
+
+
+def test_one_line_names_each_axis() -> None:
+    known = Known()
+    known.take([Status(axes=("x", "y"), law="none"), Position(0.0, 1, (1e-3, -2e-3), (), (1.0, 0.0), ())], 0.0)
+    assert "disarmed  none" in one_line(known)
+    assert "x +1.000 mm +1.00 N  y -2.000 mm +0.00 N" in one_line(known)
+
+
+def test_a_trace_keeps_the_extremes_of_every_slice() -> None:
+    """An oscillation far faster than a column of dots is still seen in full."""
+    trace = Trace(1)
+    for index in range(1000):
+        trace.add(index * 1e-3, ((-1.0) ** index,))
+    assert trace.window(5) == [([-1.0], [1.0])] * 5
+    trace.add(0.0, (7.0,))  # the clock of another daemon
+    assert trace.window(3) == [None, None, ([7.0], [7.0])]
+
+
+def test_a_plot_puts_values_where_its_axis_says() -> None:
+    trace = Trace(1)
+    for index in range(20):
+        trace.add(index * SLICE_S * 1.001, (float(index),))
+    lines = [line.plain for line in plot(trace, 17, 5, ["cyan"], marks=(0.0,))]
+    assert lines[0].strip().startswith("20")
+    assert lines[-1].strip().startswith("0")
+    assert lines[0].rstrip()[-1] != "20"
+    assert [bool(set(line[7:]) - {" ", "┈"}) for line in lines] == [True] * 5
+    assert lines[-1].index("⣀" if "⣀" in lines[-1] else lines[-1][7]) == 7
+
+
+@settings(deadline=None)
+@given(st.floats(-1e6, 1e6), st.floats(0.0, 1e6), st.floats(1e-3, 10.0))
+def test_an_axis_holds_its_values_and_is_round(lowest: float, length: float, least: float) -> None:
+    bottom, top = axis(lowest, lowest + length, least)
+    slack = 1e-6 * max(1.0, abs(lowest) + length)
+    assert bottom <= lowest + slack
+    assert top >= lowest + length - slack
+    assert top - bottom >= 0.999 * least
+
+
+def test_bars_hide_nothing_that_is_not_zero() -> None:
+    assert bars([0.0, 0.001, 4.0, 8.0]) == " ▁▄█"
+    assert bars([0.0, 0.0]) == "  "
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0 J"),
+        (0.0123, "12.3 mJ"),
+        (12000.0, "12.0 kJ"),
+        (0.9999, "1.00 J"),
+        (-3.2e-4, "-320 µJ"),
+        (4e-12, "0.00 nJ"),
+    ],
+)
+def test_numbers_have_three_digits_and_a_prefix(value: float, text: str) -> None:
+    assert si(value, "J") == text

@@ -1,0 +1,115 @@
+"""What every built-in law keeps: finite forces, one set of bits, choices in the order of their constants."""
+
+from __future__ import annotations
+
+import math
+import random
+import struct
+import typing
+from types import ModuleType
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hapticd.contracts.law import (
+    LawParams,
+    LawSnapshot,
+    LawTick,
+    check_law,
+    fresh_state,
+    plain_object,
+    scalar_params,
+)
+from hapticd_controllers import energy_cycle, none, tdpa
+
+from . import machine
+from .plant import Device, Rig
+
+LAWS = (none, energy_cycle, tdpa)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+NUMBER = st.one_of(st.floats(-20.0, 20.0), st.floats(-1e-3, 1e-3), st.sampled_from([0.0, 1e-3, 5e-324, -1e308]), FINITE)
+each_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__.rpartition(".")[2])
+
+
+def choices(law: ModuleType) -> dict[str, tuple[str, ...]]:
+    return {
+        name: typing.get_args(info.annotation)
+        for name, info in law.Params.model_fields.items()
+        if typing.get_origin(info.annotation) is typing.Literal
+    }
+
+
+def readings(law: ModuleType) -> list[LawParams]:
+    """The defaults, and every other choice for itself."""
+    others = [{name: choice} for name, each in choices(law).items() for choice in each]
+    return [law.Params(), *(law.Params.model_validate(other) for other in others)]
+
+
+def bits(plain: Any) -> dict[str, bytes]:
+    return {name: struct.pack("d", getattr(plain, name)) for name in type(plain).__slots__}
+
+
+@each_law
+def test_it_keeps_the_contract(law: ModuleType) -> None:
+    check_law(law)
+
+
+@each_law
+def test_a_choice_is_the_constant_of_its_name(law: ModuleType) -> None:
+    """Compiled code knows no strings: `rule = "signed"` arrives as the index of the choice, RULE_SIGNED."""
+    for name, each in choices(law).items():
+        for index, choice in enumerate(each):
+            assert getattr(law, f"{name}_{choice}".upper().replace("-", "_")) == index
+
+
+@each_law
+def test_interpreted_and_compiled_agree_to_the_last_bit(law: ModuleType) -> None:
+    draw = random.Random(5)
+    for params in readings(law):
+        device = Device(
+            mass_kg=draw.uniform(0.1, 0.5),
+            viscous_n_s_per_m=draw.uniform(0.0, 6.0),
+            resolution_m=draw.choice([0.0, 1e-6, 1e-5]),
+            delay_samples=draw.randint(0, 1),
+            stiffness_n_per_m=draw.uniform(3e3, 3e4),
+            x_m=draw.uniform(0.0, 0.01),
+        )
+        plain, compiled = Rig(law, device, params), Rig(law, device, params, machine.drive)
+        for _ in range(20):
+            hand_n = draw.uniform(-8.0, 3.0)
+            for rig in (plain, compiled):
+                rig.change(hand_n=hand_n)
+                rig.run(0.1)
+            assert bits(plain.plant) == bits(compiled.plant)
+            assert bits(plain.state) == bits(compiled.state)
+
+
+@st.composite
+def hostile_ticks(draw: st.DrawFn) -> list[LawTick]:
+    ticks = []
+    for _ in range(draw(st.integers(1, 40))):
+        tick = LawTick(abs(draw(NUMBER)))
+        for name in LawTick.__slots__:
+            if name not in ("in_contact", "resolution_m"):
+                setattr(tick, name, draw(NUMBER))
+        tick.in_contact = tick.x_m < 0.0
+        ticks.append(tick)
+    return ticks
+
+
+@each_law
+@given(ticks=hostile_ticks(), data=st.data())
+@settings(max_examples=150, deadline=None)
+def test_finite_ticks_give_a_finite_force_and_a_state_of_numbers(
+    law: ModuleType, ticks: list[LawTick], data: st.DataObject
+) -> None:
+    params = plain_object("Params", scalar_params(data.draw(st.sampled_from(readings(law)))))
+    state = fresh_state(law)
+    law.start(state, params, LawSnapshot(*(data.draw(NUMBER) for _ in LawSnapshot.__slots__)))
+    for _ in range(3):
+        for tick in ticks:
+            force_n = law.step(state, params, tick)
+            assert math.isfinite(force_n)
+            assert all(math.isfinite(getattr(state, name)) for name in type(state).__slots__)
