@@ -6,10 +6,15 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 # What tests and examples use besides Python; one list for this file, CI and the README.
-PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev
+PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd systemd-container debootstrap
+
+# Where `make install` puts the program: a directory of its own, which `make uninstall` removes.
+PREFIX ?= /opt/hapticd
+DESTDIR ?=
+PLACE = $(DESTDIR)$(PREFIX)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint nightly bench packages clean
+.PHONY: help run test lint nightly bench packages clean install uninstall own-place
 
 help:
 	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
@@ -17,6 +22,8 @@ help:
 	@echo "make lint     formatting, style, types and import rules only"
 	@echo "make nightly  the long runs over every shipped configuration"
 	@echo "make bench    how long a tick takes on this machine"
+	@echo "make install  the daemon as a system service (as root); PREFIX=$(PREFIX), DESTDIR for packages"
+	@echo "make uninstall  all of that away again, except configurations and fault records"
 	@echo "make clean    remove the virtual environment and all that tools left"
 
 run: $(READY)
@@ -36,6 +43,23 @@ nightly: packages $(READY)
 
 bench: $(READY)
 	$(BIN)/hapticd bench
+
+install: own-place
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || .ci/packages python3-venv
+	umask 022; $(PYTHON) -m venv "$(PLACE)"
+	umask 022; "$(PLACE)/bin/python" -m pip install --quiet --disable-pip-version-check --root-user-action ignore .
+	@# Below DESTDIR the environment must not remember where it was built.
+	@test -z "$(DESTDIR)" || { \
+		grep -rlIZ "$(PLACE)" "$(PLACE)/bin" "$(PLACE)/pyvenv.cfg" | xargs -0 -r sed -i "s|$(PLACE)|$(PREFIX)|g"; \
+		"$(PLACE)/bin/python" -m compileall -q -f -s "$(DESTDIR)" -p / "$(PLACE)/lib"; }
+	"$(PLACE)/bin/python" -m hapticd service install --root "$(DESTDIR)/"
+
+uninstall: own-place
+	"$(PLACE)/bin/python" -m hapticd service uninstall --root "$(DESTDIR)/"
+	rm -rf "$(PLACE)"
+
+own-place:
+	@case "$(PREFIX)" in /*/hapticd) ;; *) echo "PREFIX must be a directory of its own: /.../hapticd"; exit 1;; esac
 
 packages:
 	@.ci/packages $(PACKAGES)

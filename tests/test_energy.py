@@ -160,9 +160,7 @@ def test_energy_is_stored_plus_dissipated_minus_generated_whatever_happens(
         world.stiffness = stiffness
         taken.append(world.move(x_m, extra_n))
         assert ledger.energy_j == pytest.approx(math.fsum(taken), abs=1e-12)
-        assert ledger.energy_j == pytest.approx(
-            ledger.stored_j + ledger.dissipated_j - ledger.generated_j, abs=1e-12
-        )
+        assert ledger.energy_j == pytest.approx(ledger.stored_j + ledger.dissipated_j - ledger.generated_j, abs=1e-12)
         assert ledger.generated_j >= generated_j
         generated_j = ledger.generated_j
 

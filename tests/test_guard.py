@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -93,7 +94,7 @@ def test_a_real_device_without_a_limit_of_its_own_needs_one() -> None:
 
 
 def test_the_simulation_profile_is_refused_for_a_real_device() -> None:
-    with pytest.raises(ConfigError, match="simulation.*real device"):
+    with pytest.raises(ConfigError, match=r"simulation.*real device"):
         guard(profile="simulation")
     free = guard(device(simulated=True), profile="simulation", max_force_n=1.0)
     assert (free.max_force_n, free.max_axis_n, free.max_speed_m_per_s) == (math.inf, math.inf, math.inf)
@@ -144,7 +145,7 @@ def test_a_release_under_way_is_made_faster_and_never_slower() -> None:
     made.release(0.01)
     forces += written(made, 10.0, 7)
     assert forces[-1] == pytest.approx(0.0, abs=1e-12)
-    assert max(a - b for a, b in zip(forces, forces[1:], strict=False)) <= 1.0 + 1e-9
+    assert max(a - b for a, b in itertools.pairwise(forces)) <= 1.0 + 1e-9
 
 
 @pytest.mark.parametrize("ramp_s", [0.0, 1e-6, 1e-3])
@@ -192,7 +193,7 @@ def test_a_lowered_limit_comes_down_by_a_ramp_from_what_is_in_use(axis_only: boo
     made.configure(SafetyConfig.model_validate({key: 2.0, "ramp_s": 0.02}), device(), [forces[-1]])
     forces += written(made, 8.0, 30)
     assert forces[-1] == pytest.approx(2.0)
-    assert max(a - b for a, b in zip(forces, forces[1:], strict=False)) == pytest.approx(6.0 / 20.0)
+    assert max(a - b for a, b in itertools.pairwise(forces)) == pytest.approx(6.0 / 20.0)
     assert made.limit_n == 2.0
 
 
@@ -202,7 +203,7 @@ def test_a_raised_limit_goes_up_by_a_ramp() -> None:
     made.configure(SafetyConfig(ramp_s=0.02), device(), [forces[-1]])
     forces += written(made, 100.0, 30)
     assert forces[-1] == pytest.approx(12.0)
-    assert max(b - a for a, b in zip(forces, forces[1:], strict=False)) == pytest.approx(0.5)
+    assert max(b - a for a, b in itertools.pairwise(forces)) == pytest.approx(0.5)
 
 
 def test_limits_that_return_from_simulation_start_from_the_force_in_use() -> None:
@@ -212,7 +213,7 @@ def test_limits_that_return_from_simulation_start_from_the_force_in_use() -> Non
     made.configure(SafetyConfig(ramp_s=0.02), info, [forces[-1]])
     forces += written(made, 100.0, 30)
     assert forces[-1] == pytest.approx(12.0)
-    assert max(a - b for a, b in zip(forces, forces[1:], strict=False)) == pytest.approx(88.0 / 20.0)
+    assert max(a - b for a, b in itertools.pairwise(forces)) == pytest.approx(88.0 / 20.0)
 
 
 BLEND_FORCES = st.floats(-1e6, 1e6)

@@ -10,7 +10,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -75,7 +75,7 @@ class Conditions:
         load_before, load_after: runnable tasks, mean of a minute.
         others: processors that other programs kept busy meanwhile, 0.5 is one of them half the time.
         stolen: processors that the host of a virtual machine gave to somebody else meanwhile.
-        rivals: other programs that ran under real-time scheduling at the start or the end; a loop has to wait for them.
+        rivals: other programs that were seen under real-time scheduling; a loop has to wait for them.
         seconds: how long the measurement took [s].
     """
 
@@ -100,47 +100,67 @@ def ratio(value: float, reference: float) -> float:
     return value / reference if reference else 0.0
 
 
-def watch_machine() -> Callable[[], Conditions]:
-    """Begin to watch the machine; the function that comes back ends it, after every child has been waited for."""
-    started_s = time.monotonic()
-    load_before = os.getloadavg()[0]
-    busy_before_s, stolen_before_s = _processor_time_s()
-    own_before_s = sum(os.times()[:4])
-    rivals_before = rivals()
+class Watch:
+    """Watches the machine from now on."""
 
-    def conditions() -> Conditions:
-        seconds = time.monotonic() - started_s
+    def __init__(self) -> None:
+        self._rivals = rivals()
+        self._started_s = time.monotonic()
+        self._load_before = os.getloadavg()[0]
+        self._busy_s, self._stolen_s = _processor_time_s()
+        self._own_s = sum(os.times()[:4])
+
+    def look(self) -> None:
+        """See whether a rival has come meanwhile."""
+        self._rivals |= rivals()
+
+    def end(self) -> Conditions:
+        """What the machine was like, once every child has been waited for."""
+        self.look()
+        seconds = time.monotonic() - self._started_s
         busy_s, stolen_s = _processor_time_s()
-        own_s = sum(os.times()[:4]) - own_before_s
+        own_s = sum(os.times()[:4]) - self._own_s
         return Conditions(
             machine=f"{platform.machine()}, {len(os.sched_getaffinity(0))} processors",
             kernel=f"{platform.release()} {platform.version()}",
             python=platform.python_version(),
-            load_before=load_before,
+            load_before=self._load_before,
             load_after=os.getloadavg()[0],
-            others=max(0.0, busy_s - busy_before_s - own_s) / seconds,
-            stolen=(stolen_s - stolen_before_s) / seconds,
-            rivals=tuple(sorted(rivals_before | rivals())),
+            others=max(0.0, busy_s - self._busy_s - own_s) / seconds,
+            stolen=(stolen_s - self._stolen_s) / seconds,
+            rivals=tuple(sorted(self._rivals)),
             seconds=seconds,
         )
 
-    return conditions
-
 
 def rivals() -> set[str]:
-    """Programs under real-time scheduling, each as its process and name; the kernel's own threads are none."""
-    found = set()
+    """Programs under real-time scheduling, each as its process and name.
+
+    Neither the kernel's own threads nor this process and what it has started.
+    """
+    parents: dict[int, int] = {}
+    commands: dict[int, str] = {}
     for process in Path("/proc").glob("[0-9]*"):
-        try:
+        with contextlib.suppress(OSError):  # it has just ended
+            parents[int(process.name)] = int((process / "stat").read_text().rpartition(")")[2].split()[1])
             command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
-            threads = [int(thread.name) for thread in (process / "task").iterdir()] if command else []
-        except OSError:  # it has just ended
-            continue
-        for thread in threads:
-            with contextlib.suppress(OSError):
-                if os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK in (os.SCHED_FIFO, os.SCHED_RR):
-                    found.add(f"{process.name} {command[:60]}")
-    return found
+            if command and any(_is_realtime(int(thread.name)) for thread in (process / "task").iterdir()):
+                commands[int(process.name)] = command[:60]
+    return {f"{process} {command}" for process, command in commands.items() if not _is_ours(process, parents)}
+
+
+def _is_realtime(thread: int) -> bool:
+    with contextlib.suppress(OSError):
+        return os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK in (os.SCHED_FIFO, os.SCHED_RR)
+    return False
+
+
+def _is_ours(process: int, parents: Mapping[int, int]) -> bool:
+    while process > 1:
+        if process == os.getpid():
+            return True
+        process = parents.get(process, 0)
+    return False
 
 
 def doubtful(bars: Iterable[Bar], conditions: Conditions) -> list[Bar]:

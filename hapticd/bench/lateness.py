@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, doubtful, ratio, watch_machine
+from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, Watch, doubtful, ratio
 from hapticd.bench.threaded import serve_threaded
 from hapticd.bench.tick import CALM, RecordedLoop, judge_body, scene, serve_daemon
 from hapticd.contracts.errors import HapticdError, RealtimeError
@@ -167,7 +167,7 @@ def measure(
         RealtimeError: the rights are missing.
         HapticdError: no compiler, or a loop did not run.
     """
-    machine = watch_machine()
+    machine = Watch()
     cpu = max(os.sched_getaffinity(0)) if cpu is None else cpu
     seed = random.randrange(1 << 31) if seed is None else seed
     order = plan(blocks, negative_control)
@@ -177,7 +177,7 @@ def measure(
         witness = compile_witness(Path(directory))
         check_rights(witness, cpu)
         for loop, load in order:
-            measured[loop, load].append(run_block(witness, cpu, loop, load, block_s))
+            measured[loop, load].append(run_block(witness, cpu, loop, load, block_s, machine))
             progress(block_s)
     cells = tuple(pool(loop, load, parts) for (loop, load), parts in measured.items())
     bars = judge(cells, "daemon")
@@ -189,7 +189,7 @@ def measure(
     thread_bars = judge(cells, "thread")
     if negative_control:
         bars.append(judge_control(thread_bars))
-    conditions = machine()
+    conditions = machine.end()
     return Report(
         conditions=conditions,
         cpu=cpu,
@@ -240,13 +240,13 @@ def check_rights(witness: Path, cpu: int) -> None:
         raise RealtimeError(f"the witness cannot run: {tried.stderr.strip()}\n{_GRANT}")
 
 
-def run_block(witness: Path, cpu: int, loop: Loop, load: Load, seconds: float) -> Block:
-    """Run a loop and its witness side by side.
+def run_block(witness: Path, cpu: int, loop: Loop, load: Load, seconds: float, machine: Watch) -> Block:
+    """Run a loop and its witness side by side; half-way, look whether another real-time program is there.
 
     Raises:
         HapticdError: one of them did not run.
     """
-    machine = watch_machine()
+    block_watch = Watch()
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="hapticd-bench-") as directory:
         if load == "burners":
             stack.enter_context(_burners(60.0 + seconds))
@@ -256,11 +256,13 @@ def run_block(witness: Path, cpu: int, loop: Loop, load: Load, seconds: float) -
         file = Path(directory) / "witness"
         watching = _start(witness, cpu, WITNESS_PRIORITY, _SETTLE_S + seconds + _MARGIN_S, file)
         stack.callback(_end, watching)
-        time.sleep(_SETTLE_S + seconds)
+        time.sleep((_SETTLE_S + seconds) / 2)
+        machine.look()
+        time.sleep((_SETTLE_S + seconds) / 2)
         late_us, busy_us = running.stop()
         _wait(watching)
         block = cut(late_us, read_pairs(file), busy_us, seconds)
-    return replace(block, others=machine().others)
+    return replace(block, others=block_watch.end().others)
 
 
 def read_pairs(file: Path) -> dict[int, float]:

@@ -24,7 +24,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from hapticd import registry
-from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, doubtful, ratio, watch_machine
+from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, Watch, doubtful, ratio
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import MAX_WALLS, LoopConfig
 from hapticd.contracts.errors import HapticdError
@@ -383,13 +383,18 @@ def measure(
     Raises:
         HapticdError: nothing can be measured.
     """
-    machine = watch_machine()
-    measured = measure_bodies(cases(), ticks, rounds, progress)
+    machine = Watch()
+
+    def advance(seconds: float) -> None:
+        machine.look()
+        progress(seconds)
+
+    measured = measure_bodies(cases(), ticks, rounds, advance)
     rates: list[Rate] = []
     for rate_hz in rates_hz if rate_s else ():
         rates.append(measure_rate(rate_hz, rate_s, rates[0].late_us.p50 if rates else 0.0))
-        progress(rate_s)
-    conditions = machine()
+        advance(rate_s)
+    conditions = machine.end()
     return Report(
         conditions=conditions,
         realtime=measured.realtime,
@@ -613,7 +618,7 @@ def _measure_bodies(connection: Connection, found: Sequence[Case], ticks: int, r
                 sample.run(block, sleep_until)
                 sample.run(block, None)
                 gc.collect()
-                connection.send(block / RATE_HZ)
+            connection.send(len(order) * block / RATE_HZ)
     except HapticdError as error:
         connection.send(HapticdError(str(error)))
         return

@@ -24,6 +24,7 @@ COMMANDS: Final = {
     "disarm": "Ramp the force of a running daemon to zero.",
     "clear": "Clear the fault that stopped a running daemon.",
     "reload": "Let a running daemon take its edited file over.",
+    "service": "Install, show or remove the system service.",
     "simulate": "Run a configuration offline on the simulated device.",
     "bench": "Measure tick and simulator against a reference.",
 }

@@ -157,7 +157,7 @@ def lateness(
         console,
         f"Excess over the witness at 1 kHz [us], processor {report.cpu}, {report.blocks} x {report.block_s:g} s a cell",
         *("loop", "load", "joined", "skipped", "p50", "p99", "p99.9", "max", "> 200 us"),
-        *("witness p99.9", "witness > 200 us", "witness skipped", "others"),
+        *("witness p99.9", "> 200 us", "skipped", "others"),
     )
     for cell in report.cells:
         table.add_row(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Generator
+from functools import partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,6 @@ from hapticd.config.models import SafetyConfig, SceneConfig
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import EventCode
 from hapticd.control.contact import RunningLaw
-from hapticd.guard import Guard
 
 if TYPE_CHECKING:
     from hapticd.control.loop import ControlLoop
@@ -93,16 +93,9 @@ class Letters:
         new_scene = SceneConfig.model_validate(scene)
         new_safety = SafetyConfig.model_validate(safety)
         yield
-        RunningLaw(module, values)  # shows that it can be built, before anything has changed
-        yield
-        Guard(new_safety, tick.info)  # refuses limits that this device cannot have, before anything has changed
-        tick.switch_scene(new_scene)
-        tick.guard.configure(new_safety, tick.info)
-        tick.ramp_s = new_safety.ramp_s
+        make_law = None if keep_law else partial(RunningLaw, module, values)
+        tick.switch(new_scene, new_safety, make_law)
         if not keep_law:
-            tick.make_law = lambda: RunningLaw(module, values)
-            if not tick.fallback:
-                tick.switch_law(tick.make_law)
             loop.law_count += 1
         text = f"configuration {config}: law {law} goes on" if keep_law else f"configuration {config}: law {was} -> {law}"
         loop.event(EventCode.SWITCHED, text, law_before=was, law=law, config=config)

@@ -195,25 +195,34 @@ class ControlLoop:
 
     def _record(self, sample: Sample, deadline_ns: int, late_us: float, busy_us: float, skipped: int) -> None:
         tick = self.tick
-        energy_j = stored_j = dissipated_j = generated_j = 0.0
+        past = tick.past
+        energy_j = past.energy_j
+        stored_j = past.stored_j
+        dissipated_j = past.dissipated_j
+        generated_j = past.generated_j
         walls: list[float] = []
         for contact in tick.contacts:
             ledger = contact.ledger
-            law = contact.law
             energy_j += ledger.energy_j
             stored_j += ledger.stored_j
             dissipated_j += ledger.dissipated_j
             generated_j += ledger.generated_j
             walls += (
-                contact.tick.in_contact,
-                law.state.damping_n_s_per_m if law.publishes_damping else 0.0,
-                law.state.felt_mass_kg if law.publishes_mass else 0.0,
+                contact.in_contact,
+                contact.damping_n_s_per_m,
+                contact.felt_mass_kg,
                 ledger.cycle,
                 ledger.cycle_energy_j,
                 ledger.cycle_generated_j,
                 ledger.cycle_damping_n_s_per_m,
                 ledger.cycle_duration_s,
             )
+        for contact in tick.leaving:
+            ledger = contact.ledger
+            energy_j += ledger.energy_j
+            stored_j += ledger.stored_j
+            dissipated_j += ledger.dissipated_j
+            generated_j += ledger.generated_j
         shared = self.shared
         layout = shared.layout
         words = shared.words

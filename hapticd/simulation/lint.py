@@ -16,7 +16,7 @@ from hapticd.contracts.law import LawSnapshot, LawTick, state_fields
 _ARITHMETIC = "a law is + - * /, comparisons, min, max, abs and sqrt on floats"
 _CALLS = {min, max, abs, float, int, bool, math.sqrt, range, len}
 _OPERATORS = {
-    ast.Pow: ("x ** y", "write x * x; ** rounds and overflows differently when compiled", False),
+    ast.Pow: ("**", "write x * x; ** rounds and overflows differently when compiled", False),
     ast.Mod: ("%", "its sign rule is easy to get wrong; keep a count or compare", False),
     ast.FloorDiv: ("//", "divide and compare instead", False),
     ast.MatMult: ("@", _ARITHMETIC, True),
@@ -142,6 +142,8 @@ class _Body(ast.NodeVisitor):
     def visit(self, node: ast.AST) -> Any:
         if type(node) in _STATEMENTS:
             construct, advice = _STATEMENTS[type(node)]
+            if isinstance(node, ast.Subscript):
+                self.visit(node.value)
             self._found(node, construct, advice, True)
             return
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
@@ -157,6 +159,8 @@ class _Body(ast.NodeVisitor):
     def visit_Constant(self, node: ast.Constant) -> None:
         if isinstance(node.value, str | bytes):
             self._found(node, f"the string {node.value!r}", "a choice arrives as the index of the chosen value", True)
+        elif node.value is None:
+            self._found(node, "None", "a law's values are numbers", True)
         elif isinstance(node.value, complex):
             self._found(node, "a complex number", _ARITHMETIC, True)
 
@@ -187,6 +191,9 @@ class _Body(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Call(self, node: ast.Call) -> None:
+        if not isinstance(node.func, ast.Name | ast.Attribute):
+            self.visit(node.func)
+            return
         for argument in [*node.args, *(keyword.value for keyword in node.keywords)]:
             self.visit(argument)
         name = ast.unparse(node.func)

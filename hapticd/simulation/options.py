@@ -7,13 +7,23 @@ import itertools
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from hapticd.contracts.driver import DriverOptions
 from hapticd.simulation.presets import PRESETS
 
 MAX_DELAY_SAMPLES = 64
 _FORCE = 1e6  # [N], far beyond any hand: a bound only against slips of the pen
+
+
+def _zero_or_at_least(least: float) -> AfterValidator:
+    def check(value: float) -> float:
+        if 0.0 < value < least:
+            raise ValueError(f"must be 0 or at least {least:g}")
+        return value
+
+    return AfterValidator(check)
+
 
 Newton = Annotated[float, Field(ge=-_FORCE, le=_FORCE)]
 Seconds = Annotated[float, Field(ge=0.0, le=1e9)]
@@ -42,7 +52,7 @@ class RampForce(DriverOptions):
     newton: Newton = Field(description="force at the end and after [N]")
     from_newton: Newton = Field(0.0, description="force at the start and before [N]")
     at_s: Seconds = Field(0.0, description="when the ramp starts [s]")
-    duration_s: float = Field(gt=0.0, le=1e9, description="how long it takes [s]")
+    duration_s: float = Field(ge=1e-6, le=1e9, description="how long it takes [s]")
 
 
 class SineForce(DriverOptions):
@@ -62,7 +72,7 @@ class ChirpForce(DriverOptions):
     offset_newton: Newton = Field(0.0, description="mean [N]")
     start_hz: float = Field(ge=0.0, le=1e6, description="frequency at the start [Hz]")
     end_hz: float = Field(ge=0.0, le=1e6, description="frequency at the end and after [Hz]")
-    duration_s: float = Field(gt=0.0, le=1e9, description="how long the sweep takes [s]")
+    duration_s: float = Field(ge=1e-6, le=1e9, description="how long the sweep takes [s]")
 
 
 class PressAndReleaseForce(DriverOptions):
@@ -71,7 +81,7 @@ class PressAndReleaseForce(DriverOptions):
     profile: Literal["press-and-release"] = "press-and-release"
     newton: Newton = Field(-3.0, description="force when pressed hardest [N]")
     release_newton: Newton = Field(0.0, description="force when let go; positive draws back [N]")
-    period_s: float = Field(1.0, gt=0.0, le=1e9, description="time of one press and release [s]")
+    period_s: float = Field(1.0, ge=1e-6, le=1e9, description="time of one press and release [s]")
 
 
 class RecordedForce(DriverOptions):
@@ -126,7 +136,7 @@ class Change(DriverOptions):
     """One entry of changes: new values from some time on."""
 
     at_s: Seconds = Field(description="device time of the first period with the new values [s]")
-    mass_kg: float | None = Field(None, gt=1e-9, le=1e6, description="new mass [kg]")
+    mass_kg: float | None = Field(None, ge=1e-9, le=1e6, description="new mass [kg]")
     viscous_n_s_per_m: float | None = Field(None, ge=-1e6, le=1e9, description="new viscous friction [N s/m]")
     coulomb_n: float | None = Field(None, ge=0.0, le=_FORCE, description="new Coulomb friction [N]")
     max_force_n: float | None = Field(None, ge=0.0, le=_FORCE, description="new saturation, 0 = none [N]")
@@ -156,12 +166,14 @@ class SimulationOptions(DriverOptions):
         "omega7",
         description="preset for mass, friction, resolution and force; a model, not a fact about hardware",
     )
-    mass_kg: float = Field(0.25, gt=1e-9, le=1e6, description="mass that moves [kg]")
+    mass_kg: float = Field(0.25, ge=1e-9, le=1e6, description="mass that moves [kg]")
     viscous_n_s_per_m: float = Field(
         4.4, ge=-1e6, le=1e9, description="viscous friction; negative makes the device active [N s/m]"
     )
     coulomb_n: float = Field(0.0, ge=0.0, le=_FORCE, description="Coulomb friction, the same at rest and sliding [N]")
-    resolution_m: float = Field(1e-5, ge=0.0, le=1.0, description="step of the measured position, 0 = continuous [m]")
+    resolution_m: Annotated[float, _zero_or_at_least(1e-12)] = Field(
+        1e-5, ge=0.0, le=1.0, description="step of the measured position, 0 = continuous [m]"
+    )
     noise_m: float = Field(
         0.0, ge=0.0, le=1.0, description="standard deviation of sensor noise; never beyond 3.5 of it [m]"
     )
@@ -169,7 +181,7 @@ class SimulationOptions(DriverOptions):
     max_force_n: float = Field(
         12.0, ge=0.0, le=_FORCE, description="force at which the actuator saturates, 0 = never [N]"
     )
-    bandwidth_hz: float = Field(
+    bandwidth_hz: Annotated[float, _zero_or_at_least(1e-3)] = Field(
         0.0, ge=0.0, le=1e9, description="corner of the first-order actuator, 0 = immediate [Hz]"
     )
     force_delay_samples: int = Field(

@@ -6,7 +6,6 @@ import io
 from typing import Any
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -62,11 +61,3 @@ def png(drawn: Figure) -> bytes:
     with mpl.rc_context(RC):
         drawn.savefig(picture, format="png", metadata={"Software": None})
     return picture.getvalue()
-
-
-def note(axes: Axes, text: str) -> None:
-    """A remark in the upper right corner of a plot."""
-    axes.text(
-        0.98, 0.98, text, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2.0},
-    )  # fmt: skip

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.bench import Quantiles, Verdict, doubtful, lateness, watch_machine
+from hapticd.bench import Quantiles, Verdict, Watch, doubtful, lateness
 from hapticd.bench.lateness import Block, Cell, Load, Loop
 from hapticd.bench.threaded import serve_threaded
 from hapticd.bench.tick import RecordedLoop, scene, serve_daemon
@@ -177,7 +177,7 @@ class TestNegativeControl:
 def test_beside_another_real_time_program_nothing_is_judged() -> None:
     """Two loops of one priority on one processor wait for each other, at every millisecond."""
     bars = lateness.judge([cell("C", a_loop()), cell("daemon", a_loop(p50=50.0))], "daemon")
-    calm = watch_machine()()
+    calm = Watch().end()
     assert doubtful(bars, replace(calm, rivals=())) == bars
     assert {bar.verdict for bar in doubtful(bars, replace(calm, rivals=("42 other",)))} == {"INCONCLUSIVE"}
 

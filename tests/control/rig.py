@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from types import ModuleType
@@ -91,7 +92,13 @@ class Rig:
         info = device(axes, **declared)
         config = SafetyConfig.model_validate({"max_speed_m_per_s": 100.0, **(safety or {})})
         self.tick = ControlTick(
-            scene(*walls), velocity or VelocityConfig(), Guard(config, info), info, running(module), PERIOD_S, config.ramp_s
+            scene(*walls),
+            velocity or VelocityConfig(),
+            Guard(config, info),
+            info,
+            running(module),
+            PERIOD_S,
+            config.ramp_s,
         )
         self.sample = Sample(len(axes))
         self.sample.position_m[:] = [at_m] * len(axes)
@@ -111,8 +118,7 @@ class Rig:
             before_m, before_n = list(self.tick.position_m), list(self.tick.force_n)
             written.append(list(self.tick.step(self.sample, dt_s)))
             self.energy_j -= sum(
-                newton * (now - was)
-                for newton, now, was in zip(before_n, self.tick.position_m, before_m, strict=True)
+                newton * (now - was) for newton, now, was in zip(before_n, self.tick.position_m, before_m, strict=True)
             )
         return written
 
@@ -137,4 +143,4 @@ class Rig:
 
 
 def largest_step(forces_n: list[float]) -> float:
-    return max(abs(b - a) for a, b in zip(forces_n, forces_n[1:], strict=False))
+    return max(abs(b - a) for a, b in itertools.pairwise(forces_n))

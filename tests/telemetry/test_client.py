@@ -256,7 +256,7 @@ def test_any_bytes_are_records_or_an_error_that_says_so(topic: bytes, payload: b
         assert isinstance(decode(topic, payload), list)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=60)
 @given(TOPICS, st.lists(st.dictionaries(KEYS, TREES)) | TREES)
 def test_any_msgpack_is_records_or_an_error_in_one_line(topic: bytes, payload: Any) -> None:
     text, records = "", []

@@ -44,6 +44,12 @@ class Quantity:
         """Name and unit as they stand at an axis."""
         return f"{self.label} [{self.shown_unit or self.unit}]"
 
+    @property
+    def column(self) -> str:
+        """Name in a table."""
+        table, _, field = self.key.rpartition(".")
+        return {"force": "hand_force_n"}.get(field, f"hand_{field}" if table.endswith(".hand") else field)
+
     def put(self, scenario: Scenario, value: float) -> Scenario:
         """The scenario with another value."""
         return _put(scenario, self.key, value)

@@ -1,0 +1,80 @@
+"""`hapticd service`: the daemon as a service of this computer."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hapticd.installation import Installation, systemd_runs, unit_states
+
+app = typer.Typer(
+    help="Install the daemon as a service, look at it, remove it.",
+    epilog="Example: sudo hapticd service install",
+    rich_markup_mode=None,
+)
+
+Root = Annotated[Path, typer.Option("--root", help="File system to fill, for a package or an image.")]
+
+
+@app.command()
+def install(
+    root: Root = Path("/"),
+    executable: Annotated[
+        Path | None, typer.Option("--executable", help="The hapticd that the units run; this one when not given.")
+    ] = None,
+) -> None:
+    """Install units, user, device rules and a first configuration.
+
+    Nothing is started. A configuration that is there already is kept.
+
+    Example: sudo hapticd service install
+    """
+    Installation(root, executable).install(typer.echo)
+
+
+@app.command()
+def uninstall(root: Root = Path("/")) -> None:
+    """Stop the service and remove it; configurations and fault records stay.
+
+    Example: sudo hapticd service uninstall
+    """
+    Installation(root).uninstall(typer.echo)
+
+
+@app.command()
+def status(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
+    """Show what is installed and what runs.
+
+    Exits with 1 unless everything is installed and a daemon runs.
+
+    Example: hapticd service status
+    """
+    files = Installation().files()
+    units = unit_states()
+    if as_json:
+        shown = {
+            "files": {str(file.path): file.state for file in files},
+            "systemd": systemd_runs(),
+            "units": [asdict(unit) for unit in units],
+        }
+        typer.echo(json.dumps(shown, indent=2))
+    else:
+        for file in files:
+            typer.echo(f"{file.state:9}  {file.path}")
+        if not systemd_runs():
+            typer.echo("systemd does not run this computer")
+        for unit in units:
+            said = unit.text if unit.active == "active" else "" if unit.result == "success" else f"ended: {unit.result}"
+            parts = [
+                f"{unit.active:9}  {unit.name}",
+                unit.enabled,
+                said,
+                f"{unit.restarts} restarts" * bool(unit.restarts),
+            ]
+            typer.echo("; ".join(filter(None, parts)))
+    well = all(file.state == "installed" for file in files) and any(unit.active == "active" for unit in units)
+    raise typer.Exit(0 if well else 1)

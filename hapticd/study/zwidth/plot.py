@@ -1,0 +1,144 @@
+"""The picture of a map: laws side by side, the analytic limits drawn over each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap, ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from hapticd.study import style
+from hapticd.study.verdict import Outcome
+from hapticd.study.zwidth.curves import Curve
+from hapticd.study.zwidth.plane import Axis
+from hapticd.study.zwidth.sweep import Plan
+
+_COLOURS = {
+    Outcome.SETTLED: style.BLUE,
+    Outcome.ELSEWHERE: style.SAND,
+    Outcome.MOVING: style.PALE,
+    Outcome.DIVERGED: style.GREY,
+}
+_DASHES: dict[str, Any] = {"stable": "-", "passive": (0, (5, 2)), "quantised-passive": (0, (1.2, 1.4))}
+_COLUMNS = 3
+
+
+def draw(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Sequence[Curve]) -> bytes:
+    """The map as a PNG file."""
+    return _draw_cells(plan, tables, found) if plan.method == "grid" else _draw_edges(plan, tables, found)
+
+
+def _draw_cells(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Sequence[Curve]) -> bytes:
+    columns = min(_COLUMNS, len(tables))
+    rows = -(-len(tables) // columns)
+    figure, axes = style.figure(0.9 + 3.1 * columns, 1.25 + 2.9 * rows, rows, columns, sharex=True, sharey=True)
+    share = plan.starts > 1
+    for at, (table, reading) in enumerate(zip(tables, plan.readings, strict=True)):
+        panel = axes[at // columns][at % columns]
+        settled = table[:, 0] == Outcome.SETTLED
+        shape = (len(plan.y.values), len(plan.x.values))
+        edges = (_cell_edges(plan.x), _cell_edges(plan.y))
+        if share:
+            colours = LinearSegmentedColormap.from_list("share", [style.PALE, style.BLUE])
+            panel.pcolormesh(*edges, table[:, 1].reshape(shape) / plan.starts, cmap=colours, vmin=0.0, vmax=1.0)
+        else:
+            colours = ListedColormap([_COLOURS[outcome] for outcome in Outcome])
+            norm = BoundaryNorm(np.arange(-0.5, len(Outcome)), len(Outcome))
+            panel.pcolormesh(*edges, table[:, 0].reshape(shape), cmap=colours, norm=norm)
+        _curves(panel, plan, found)
+        _frame(panel, plan)
+        panel.grid(visible=False)
+        panel.set_title(f"{reading.label}   {_percent(settled.mean())} settled", loc="left")
+    for at in range(len(tables), rows * columns):
+        axes[at // columns][at % columns].set_visible(False)
+    figure.supxlabel(plan.x.quantity.axis_label, fontsize=9.5)
+    figure.supylabel(plan.y.quantity.axis_label, fontsize=9.5)
+    if share:
+        patches = [Patch(color=style.BLUE, label="all starts settled"), Patch(color=style.PALE, label="none")]
+    else:
+        seen = {int(outcome) for table in tables for outcome in np.unique(table[:, 0])}
+        patches = [
+            Patch(facecolor=_COLOURS[outcome], edgecolor=style.GREY, linewidth=0.5, label=outcome.words)
+            for outcome in Outcome
+            if outcome in seen
+        ]
+    figure.legend(handles=[*patches, *_curve_handles(found)], loc="outside lower center", ncols=2 if columns < 3 else 3)
+    return style.png(figure)
+
+
+def _draw_edges(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Sequence[Curve]) -> bytes:
+    figure, axes = style.figure(6.4, 5.0)
+    panel = axes[0][0]
+    y = np.array(plan.y.values) * plan.y.quantity.shown_scale
+    handles = []
+    for at, (table, reading) in enumerate(zip(tables, plan.readings, strict=True)):
+        colour = style.SERIES[at % len(style.SERIES)]
+        x = edge_middles(plan.x, table) * plan.x.quantity.shown_scale
+        panel.plot(x, y, color=colour, linewidth=2.2, marker="o", markersize=2.6)
+        handles.append(Line2D([], [], color=colour, linewidth=2.2, marker="o", markersize=3.5, label=reading.label))
+    _curves(panel, plan, found)
+    _frame(panel, plan)
+    panel.margins(0.0)
+    panel.set_xlabel(plan.x.quantity.axis_label)
+    panel.set_ylabel(plan.y.quantity.axis_label)
+    panel.set_title("Edge of what settles; along the border there is none in this range", loc="left")
+    figure.legend(handles=[*handles, *_curve_handles(found)], loc="outside lower center", ncols=2)
+    return style.png(figure)
+
+
+def edge_middles(axis: Axis, table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Where to draw the edge of each line; without one, at the end of the range that it lies beyond."""
+    low, high = axis.values[0], axis.values[-1]
+    settles_low, settles_high = table[:, 0] > 0.5, table[:, 1] > 0.5
+    settles_upward = np.sum(~settles_low & settles_high) > np.sum(settles_low & ~settles_high)
+    beyond = np.where(settles_low == settles_upward, low, high)
+    middles = [axis.between(*bracket) if not math.isnan(bracket[0]) else math.nan for bracket in table[:, 2:4]]
+    return np.where(settles_low == settles_high, beyond, middles)
+
+
+def _curves(panel: Axes, plan: Plan, found: Sequence[Curve]) -> None:
+    for curve in found:
+        for line in curve.lines:
+            x, y = np.array(line).T
+            scaled = (x * plan.x.quantity.shown_scale, y * plan.y.quantity.shown_scale)
+            # a light edge keeps a dark line legible on any ground
+            panel.plot(*scaled, color="white", linewidth=2.8, alpha=0.7)
+            panel.plot(*scaled, color=style.INK, linewidth=1.3, linestyle=_DASHES[curve.key])
+
+
+def _curve_handles(found: Sequence[Curve]) -> list[Line2D]:
+    return [
+        Line2D([], [], color=style.INK, linewidth=1.3, linestyle=_DASHES[curve.key], label=curve.label)
+        for curve in found
+    ]
+
+
+def _frame(panel: Axes, plan: Plan) -> None:
+    if plan.x.logarithmic:
+        panel.set_xscale("log")
+    if plan.y.logarithmic:
+        panel.set_yscale("log")
+    x, y = (_cell_edges(axis) for axis in (plan.x, plan.y))
+    panel.set_xlim(x[0], x[-1])
+    panel.set_ylim(y[0], y[-1])
+
+
+def _cell_edges(axis: Axis) -> np.ndarray[Any, Any]:
+    """Where cells begin and end, in shown units."""
+    values = np.array(axis.values) * axis.quantity.shown_scale
+    if len(values) == 1:
+        return np.array([values[0] * 0.9 - 0.1, values[0] * 1.1 + 0.1])
+    if axis.logarithmic:
+        values = np.log(values)
+    middles = 0.5 * (values[1:] + values[:-1])
+    edges = np.concatenate([[2.0 * values[0] - middles[0]], middles, [2.0 * values[-1] - middles[-1]]])
+    return np.exp(edges) if axis.logarithmic else edges
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
