@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 # What tests and examples use besides Python; one list for this file, CI and the README.
-PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd systemd-container debootstrap
+PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd-container debootstrap
 
 # Where `make install` puts the program: a directory of its own, which `make uninstall` removes.
 PREFIX ?= /opt/hapticd

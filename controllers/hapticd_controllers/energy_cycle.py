@@ -115,11 +115,16 @@ class State(CycleFields):
     older_applied_n: float  # F(n-3)
     count: float  # effective samples in the sums below, which forget
     sum_w: float  # w: change of mean speed
-    sum_u: float  # u: impulse, forces in time
+    sum_s: float  # s: mean move, which viscous friction brakes
+    sum_ss: float
+    sum_sw: float
+    sum_u: float  # u: mean impulse of the forces
     sum_uu: float
+    sum_us: float
     sum_uw: float
     late_sum_u: float  # the same, forces one sample late
     late_sum_uu: float
+    late_sum_us: float
     late_sum_uw: float
 
 
@@ -140,11 +145,16 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.older_applied_n = 0.0
     state.count = 0.0
     state.sum_w = 0.0
+    state.sum_s = 0.0
+    state.sum_ss = 0.0
+    state.sum_sw = 0.0
     state.sum_u = 0.0
     state.sum_uu = 0.0
+    state.sum_us = 0.0
     state.sum_uw = 0.0
     state.late_sum_u = 0.0
     state.late_sum_uu = 0.0
+    state.late_sum_us = 0.0
     state.late_sum_uw = 0.0
 
 
@@ -262,10 +272,11 @@ def _feel(state: Any, params: Any, tick: Any) -> None:
 
     A held force makes the change of mean speed between two moves exact, evenly sampled or not:
 
-        w = moved(n)/dt(n) - moved(n-1)/dt(n-1) = u / m,      u = (F(n-1) dt(n) + F(n-2) dt(n-1)) / 2
+        w = moved(n)/dt(n) - moved(n-1)/dt(n-1)     u = (F(n-1) dt(n) + F(n-2) dt(n-1)) / 2
+        m w = u - b s + hand                        s = (moved(n) + moved(n-1)) / 2
 
-    The hand's slow force is the intercept of the line of w over u, its slope is 1/m. A second line over forces one
-    sample older tells the delay: the one that explains more of w is believed.
+    so that a plane through (u, s, w) has the slope 1/m along u; the hand's slow force is its intercept. A second
+    plane, over forces one sample older, tells the delay: the one that explains more of w is believed.
     """
     applied_n = _bounded(tick.applied_n)
     moved_m = _bounded(tick.moved_m)
@@ -273,16 +284,22 @@ def _feel(state: Any, params: Any, tick: Any) -> None:
     seen = applied_n != 0.0 and state.last_applied_n != 0.0 and state.older_applied_n != 0.0
     if seen and dt_s > 0.0 and state.last_dt_s > 0.0 and abs(moved_m) > FELT_COUNTS * tick.resolution_m:
         w = _bounded(_bounded(moved_m / dt_s) - _bounded(state.last_moved_m / state.last_dt_s))
+        s = 0.5 * (moved_m + state.last_moved_m)
         u = _bounded(0.5 * (applied_n * dt_s + state.last_applied_n * state.last_dt_s))
         late_u = _bounded(0.5 * (state.last_applied_n * dt_s + state.older_applied_n * state.last_dt_s))
         keep = params.felt_mass_memory
         state.count = keep * state.count + 1.0
         state.sum_w = keep * state.sum_w + w
+        state.sum_s = keep * state.sum_s + s
+        state.sum_ss = keep * state.sum_ss + s * s
+        state.sum_sw = keep * state.sum_sw + s * w
         state.sum_u = keep * state.sum_u + u
         state.sum_uu = keep * state.sum_uu + u * u
+        state.sum_us = keep * state.sum_us + u * s
         state.sum_uw = keep * state.sum_uw + u * w
         state.late_sum_u = keep * state.late_sum_u + late_u
         state.late_sum_uu = keep * state.late_sum_uu + late_u * late_u
+        state.late_sum_us = keep * state.late_sum_us + late_u * s
         state.late_sum_uw = keep * state.late_sum_uw + late_u * w
     state.last_moved_m = moved_m
     state.last_dt_s = dt_s
@@ -291,11 +308,24 @@ def _feel(state: Any, params: Any, tick: Any) -> None:
 
 
 def _believe(state: Any, params: Any) -> None:
-    """Mass and delay from the line that fits better; nothing where neither force speeds the device up."""
-    variance = state.sum_uu - state.sum_u * state.sum_u / state.count
-    covariance = state.sum_uw - state.sum_u * state.sum_w / state.count
-    late_variance = state.late_sum_uu - state.late_sum_u * state.late_sum_u / state.count
-    late_covariance = state.late_sum_uw - state.late_sum_u * state.sum_w / state.count
+    """Mass and delay from the plane that fits better; nothing where neither force speeds the device up."""
+    mean_u = state.sum_u / state.count
+    mean_late_u = state.late_sum_u / state.count
+    variance = state.sum_uu - mean_u * state.sum_u
+    covariance = state.sum_uw - mean_u * state.sum_w
+    late_variance = state.late_sum_uu - mean_late_u * state.late_sum_u
+    late_covariance = state.late_sum_uw - mean_late_u * state.sum_w
+    braked = True
+    variance_s = state.sum_ss - state.sum_s * state.sum_s / state.count
+    if variance_s > 0.0:  # take out what goes with the speed
+        us = state.sum_us - mean_u * state.sum_s
+        late_us = state.late_sum_us - mean_late_u * state.sum_s
+        sw = state.sum_sw - state.sum_s * state.sum_w / state.count
+        variance -= us * us / variance_s
+        covariance -= us * sw / variance_s
+        late_variance -= late_us * late_us / variance_s
+        late_covariance -= late_us * sw / variance_s
+        braked = sw * variance <= us * covariance  # b >= 0 in the plane without delay
     explained = 0.0
     late_explained = 0.0
     if variance > 0.0 and covariance > 0.0:
@@ -303,7 +333,7 @@ def _believe(state: Any, params: Any) -> None:
     if late_variance > 0.0 and late_covariance > 0.0:
         late_explained = late_covariance * late_covariance / late_variance
     if params.force_delay == FORCE_DELAY_IDENTIFIED and (explained > 0.0 or late_explained > 0.0):
-        state.forces_late = late_explained > explained
+        state.forces_late = late_explained > explained or not braked
     if state.forces_late:
         if late_explained > 0.0:
             state.felt_mass_kg = _bounded(late_variance / late_covariance)

@@ -10,21 +10,27 @@
 #include "batch_types.h"
 
 #define LIMIT 1e12
+#define MOST 1e18
+#define FARTHEST 1e6
+#define TINY_MOTION 1e-24
+#define FELT_SAMPLES 20.0
+#define FELT_COUNTS 2.0
+#define ROUND 6755399441055744.0
 
 enum { WORK_SPRING, WORK_TOTAL };
 enum { PAIRING_EXACT, PAIRING_NEW_FORCE, PAIRING_POWER, PAIRING_HELD_POWER };
+enum { FORCE_DELAY_IDENTIFIED, FORCE_DELAY_NONE, FORCE_DELAY_ONE_SAMPLE };
 enum { SUM_CYCLE, SUM_START };
 enum { RULE_SIGNED, RULE_NON_NEGATIVE, RULE_NON_DECREASING };
 enum { PLATEAUS_SKIPPED, PLATEAUS_LITERAL };
 enum { CONTACT_LOSS_ENDS_CYCLE, CONTACT_LOSS_IGNORED };
 enum { NEW_CONTACT_KEEP, NEW_CONTACT_ENERGY, NEW_CONTACT_DAMPING };
-enum { STORED_KEPT, STORED_SUBTRACTED };
+enum { STORED_ENERGY_KEPT, STORED_ENERGY_SUBTRACTED };
 enum { CAP_FELT_MASS, CAP_KNOWN_MASS, CAP_FIXED, CAP_NONE };
 
 static inline double bounded(double value) {
-    if (value > LIMIT) return LIMIT;
-    if (value < -LIMIT) return -LIMIT;
-    return value;
+    if (-LIMIT < value && value < LIMIT) return value;
+    return value > 0.0 ? LIMIT : -LIMIT;
 }
 
 static inline bool cycle_ended(law_state *s, double energy, bool in_contact, int64_t past, int64_t future) {
@@ -43,8 +49,8 @@ static inline bool cycle_ended(law_state *s, double energy, bool in_contact, int
         s->window_energy_j = energy;
     }
     if (!in_contact) {
-        if (s->window_falls >= past && s->window_rises == 0) {
-            s->window_minimum_j = s->window_energy_j;
+        if (s->window_falls >= past && s->window_rises < future) {
+            if (s->window_rises == 0) s->window_minimum_j = s->window_energy_j;
             ended = true;
         }
         s->window_falls = 0;
@@ -53,16 +59,124 @@ static inline bool cycle_ended(law_state *s, double energy, bool in_contact, int
     return ended;
 }
 
+static inline void begin(law_state *s, double energy) {
+    s->energy_j = energy;
+    s->window_energy_j = energy;
+    s->window_minimum_j = 0.0;
+    s->window_falls = 0;
+    s->window_rises = 0;
+    s->motion_m2_per_s = 0.0;
+    s->candidate_motion_m2_per_s = 0.0;
+    s->candidate_stored_j = 0.0;
+    s->stored_j = 0.0;
+}
+
+static inline void feel(law_state *s, const law_params *p, const law_tick *t) {
+    double applied = bounded(t->applied_n);
+    double moved = bounded(t->moved_m);
+    double dt = bounded(t->dt_s);
+    bool seen = applied != 0.0 && s->last_applied_n != 0.0 && s->older_applied_n != 0.0;
+    if (seen && dt > 0.0 && s->last_dt_s > 0.0 && fabs(moved) > FELT_COUNTS * t->resolution_m) {
+        double w = bounded(bounded(moved / dt) - bounded(s->last_moved_m / s->last_dt_s));
+        double mean = 0.5 * (moved + s->last_moved_m);
+        double u = bounded(0.5 * (applied * dt + s->last_applied_n * s->last_dt_s));
+        double late_u = bounded(0.5 * (s->last_applied_n * dt + s->older_applied_n * s->last_dt_s));
+        double keep = p->felt_mass_memory;
+        s->count = keep * s->count + 1.0;
+        s->sum_w = keep * s->sum_w + w;
+        s->sum_s = keep * s->sum_s + mean;
+        s->sum_ss = keep * s->sum_ss + mean * mean;
+        s->sum_sw = keep * s->sum_sw + mean * w;
+        s->sum_u = keep * s->sum_u + u;
+        s->sum_uu = keep * s->sum_uu + u * u;
+        s->sum_us = keep * s->sum_us + u * mean;
+        s->sum_uw = keep * s->sum_uw + u * w;
+        s->late_sum_u = keep * s->late_sum_u + late_u;
+        s->late_sum_uu = keep * s->late_sum_uu + late_u * late_u;
+        s->late_sum_us = keep * s->late_sum_us + late_u * mean;
+        s->late_sum_uw = keep * s->late_sum_uw + late_u * w;
+    }
+    s->last_moved_m = moved;
+    s->last_dt_s = dt;
+    s->older_applied_n = s->last_applied_n;
+    s->last_applied_n = applied;
+}
+
+static inline void believe(law_state *s, const law_params *p) {
+    double mean_u = s->sum_u / s->count;
+    double mean_late_u = s->late_sum_u / s->count;
+    double variance = s->sum_uu - mean_u * s->sum_u;
+    double covariance = s->sum_uw - mean_u * s->sum_w;
+    double late_variance = s->late_sum_uu - mean_late_u * s->late_sum_u;
+    double late_covariance = s->late_sum_uw - mean_late_u * s->sum_w;
+    double variance_s = s->sum_ss - s->sum_s * s->sum_s / s->count;
+    if (variance_s > 0.0) {
+        double us = s->sum_us - mean_u * s->sum_s;
+        double late_us = s->late_sum_us - mean_late_u * s->sum_s;
+        double sw = s->sum_sw - s->sum_s * s->sum_w / s->count;
+        variance -= us * us / variance_s;
+        covariance -= us * sw / variance_s;
+        late_variance -= late_us * late_us / variance_s;
+        late_covariance -= late_us * sw / variance_s;
+    }
+    double explained = 0.0;
+    double late_explained = 0.0;
+    if (variance > 0.0 && covariance > 0.0) explained = covariance * covariance / variance;
+    if (late_variance > 0.0 && late_covariance > 0.0) {
+        late_explained = late_covariance * late_covariance / late_variance;
+    }
+    if (p->force_delay == FORCE_DELAY_IDENTIFIED && (explained > 0.0 || late_explained > 0.0)) {
+        s->forces_late = late_explained > explained;
+    }
+    if (s->forces_late) {
+        if (late_explained > 0.0) s->felt_mass_kg = bounded(late_variance / late_covariance);
+    } else if (explained > 0.0) {
+        s->felt_mass_kg = bounded(variance / covariance);
+    }
+}
+
+static inline void count_energy(law_state *s, const law_params *p, const law_tick *t) {
+    double velocity = bounded(t->velocity_m_per_s);
+    double work;
+    if (p->pairing == PAIRING_EXACT || p->pairing == PAIRING_HELD_POWER) {
+        double held = bounded(p->work == WORK_SPRING ? t->applied_contact_n : t->applied_n);
+        work = s->forces_late ? s->last_work_n : held;
+        s->last_work_n = held;
+    } else {
+        work = bounded(t->contact_n);
+        if (p->work == WORK_TOTAL && t->in_contact) work = bounded(work - s->damping_n_s_per_m * velocity);
+    }
+    double moved;
+    if (p->pairing == PAIRING_EXACT || p->pairing == PAIRING_NEW_FORCE) {
+        moved = bounded(t->moved_m);
+    } else {
+        moved = bounded(velocity * t->dt_s);
+    }
+    s->energy_j = bounded(s->energy_j - work * moved);
+    if (t->in_contact) {
+        if (t->dt_s > 0.0) s->motion_m2_per_s = bounded(s->motion_m2_per_s + velocity * velocity * t->dt_s);
+        if (t->x_m < s->lowest_m) s->lowest_m = t->x_m;
+        if (t->x_m > s->highest_m) s->highest_m = t->x_m;
+    }
+}
+
 static inline void end_cycle(law_state *s, const law_params *p, const law_tick *t) {
-    double generated = s->window_minimum_j;
-    if (p->stored_energy == STORED_SUBTRACTED) generated -= s->candidate_stored_j - s->stored_j;
+    double gained = s->window_minimum_j;
+    double pure = gained - (s->candidate_stored_j - s->stored_j);
     double motion = s->candidate_motion_m2_per_s;
     double travel = s->highest_m - s->lowest_m;
-    if (motion > 1e-24 && travel >= p->min_travel_counts * t->resolution_m) {
-        double change = bounded(-generated / motion);
-        if (p->rule == RULE_NON_DECREASING && change < 0.0) change = 0.0;
+    if (motion > TINY_MOTION && travel >= p->min_travel_counts * t->resolution_m) {
+        bool subtract = p->stored_energy == STORED_ENERGY_SUBTRACTED;
+        double change = bounded(-(subtract ? pure : gained) / motion);
+        bool small = travel < p->small_travel_counts * t->resolution_m;
+        if (small && change > 0.0 && p->small_leaks > 0.0 && p->sum == SUM_CYCLE) {
+            double enough = p->small_leaks * bounded(-pure / motion) - s->damping_n_s_per_m;
+            if (enough < change) change = enough;
+            if (change < 0.0) change = 0.0;
+        }
+        if (change < 0.0 && p->rule == RULE_NON_DECREASING) change = 0.0;
         s->damping_n_s_per_m += change;
-        if (p->rule == RULE_NON_NEGATIVE && s->damping_n_s_per_m < 0.0) s->damping_n_s_per_m = 0.0;
+        if (s->damping_n_s_per_m < 0.0 && p->rule == RULE_NON_NEGATIVE) s->damping_n_s_per_m = 0.0;
     }
     s->energy_j -= s->window_minimum_j;
     s->window_energy_j -= s->window_minimum_j;
@@ -76,75 +190,29 @@ static inline void end_cycle(law_state *s, const law_params *p, const law_tick *
     s->highest_m = t->x_m;
 }
 
-static inline double damping_cap(const law_state *s, const law_params *p, const law_tick *t) {
+static inline double damping_cap(law_state *s, const law_params *p, const law_tick *t) {
+    if (t->dt_s > 0.0) {
+        if (s->period_s == 0.0) s->period_s = bounded(t->dt_s);
+        s->period_s += 0.01 * (bounded(t->dt_s) - s->period_s);
+    }
     double cap = p->cap_damping_n_s_per_m;
     if (p->cap == CAP_NONE) {
         cap = LIMIT;
-    } else if (p->cap != CAP_FIXED && t->dt_s > 0.0) {
+    } else if (p->cap != CAP_FIXED && s->period_s > 0.0) {
         double mass = p->cap == CAP_KNOWN_MASS ? p->mass_kg : s->felt_mass_kg;
-        if (mass > 0.0) cap = bounded(p->cap_share * mass / t->dt_s);
+        if (mass > 0.0) cap = bounded((s->forces_late ? p->late_cap_share : p->cap_share) * mass / s->period_s);
     }
     return cap;
 }
 
-static inline void feel_mass(law_state *s, const law_params *p, const law_tick *t) {
-    double moved = bounded(t->moved_m);
-    double applied = bounded(t->applied_n);
-    double enough = 2.0 * t->resolution_m;
-    if (t->dt_s > 0.0 && s->last_dt_s > 0.0 && applied != 0.0 && s->last_applied_n != 0.0 && fabs(moved) > enough) {
-        double u = bounded(0.5 * (applied * t->dt_s + s->last_applied_n * s->last_dt_s));
-        double w = bounded(bounded(moved / t->dt_s) - bounded(s->last_moved_m / s->last_dt_s));
-        double keep = p->felt_mass_memory;
-        s->count = keep * s->count + 1.0;
-        s->sum_u = keep * s->sum_u + u;
-        s->sum_w = keep * s->sum_w + w;
-        s->sum_uu = keep * s->sum_uu + u * u;
-        s->sum_uw = keep * s->sum_uw + u * w;
-        double variance = s->sum_uu - s->sum_u * s->sum_u / s->count;
-        double covariance = s->sum_uw - s->sum_u * s->sum_w / s->count;
-        if (s->count >= 20.0 && variance > 0.0 && covariance > 0.0) s->felt_mass_kg = bounded(variance / covariance);
-    }
-    s->last_moved_m = moved;
-    s->last_dt_s = t->dt_s;
-    s->last_applied_n = applied;
-}
-
-static inline void forget(law_state *s, const law_params *p) {
-    s->energy_j = 0.0;
-    s->window_energy_j = 0.0;
-    s->window_falls = 0;
-    s->window_rises = 0;
-    s->motion_m2_per_s = 0.0;
-    s->candidate_motion_m2_per_s = 0.0;
-    s->stored_j = 0.0;
-    if (p->new_contact == NEW_CONTACT_DAMPING) s->damping_n_s_per_m = 0.0;
-}
-
 static inline double law_step(law_state *s, const law_params *p, const law_tick *t) {
-    double velocity = bounded(t->velocity_m_per_s);
-    double force;
-    if (p->cap == CAP_FELT_MASS) feel_mass(s, p, t);
-    if (t->in_contact && !s->was_in_contact && p->new_contact != NEW_CONTACT_KEEP) forget(s, p);
+    if (p->cap == CAP_FELT_MASS || p->force_delay == FORCE_DELAY_IDENTIFIED) feel(s, p, t);
+    if (t->in_contact && !s->was_in_contact && p->new_contact != NEW_CONTACT_KEEP) {
+        begin(s, 0.0);
+        if (p->new_contact == NEW_CONTACT_DAMPING) s->damping_n_s_per_m = 0.0;
+    }
     s->was_in_contact = t->in_contact;
-    if (p->pairing == PAIRING_EXACT || p->pairing == PAIRING_HELD_POWER) {
-        force = p->work == WORK_SPRING ? t->applied_contact_n : t->applied_n;
-    } else if (p->work == WORK_SPRING || !t->in_contact) {
-        force = t->contact_n;
-    } else {
-        force = t->contact_n - s->damping_n_s_per_m * velocity;
-    }
-    double moved;
-    if (p->pairing == PAIRING_EXACT || p->pairing == PAIRING_NEW_FORCE) {
-        moved = bounded(t->moved_m);
-    } else {
-        moved = bounded(velocity * t->dt_s);
-    }
-    s->energy_j = bounded(s->energy_j - bounded(bounded(force) * moved));
-    if (t->in_contact) {
-        s->motion_m2_per_s = bounded(s->motion_m2_per_s + bounded(velocity * velocity * t->dt_s));
-        if (t->x_m < s->lowest_m) s->lowest_m = t->x_m;
-        if (t->x_m > s->highest_m) s->highest_m = t->x_m;
-    }
+    count_energy(s, p, t);
     if (p->plateaus == PLATEAUS_LITERAL && s->energy_j == s->window_energy_j) {
         s->window_falls = 0;
         s->window_rises = 0;
@@ -152,11 +220,14 @@ static inline double law_step(law_state *s, const law_params *p, const law_tick 
     bool inside = t->in_contact || p->contact_loss == CONTACT_LOSS_IGNORED;
     int64_t future = p->window_future > 0 ? p->window_future : p->window;
     bool ended = cycle_ended(s, s->energy_j, inside, p->window, future);
-    if (s->window_rises == 0) {
+    if (s->window_rises == 0 && (!ended || s->window_minimum_j == s->energy_j)) {
         s->candidate_motion_m2_per_s = s->motion_m2_per_s;
-        s->candidate_stored_j = bounded(0.5 * fabs(bounded(t->x_m) * bounded(t->contact_n)));
+        s->candidate_stored_j = 0.5 * fabs(bounded(t->x_m) * bounded(t->contact_n));
     }
-    if (ended) end_cycle(s, p, t);
+    if (ended) {
+        if (s->count >= FELT_SAMPLES) believe(s, p);
+        end_cycle(s, p, t);
+    }
     double cap = damping_cap(s, p, t);
     if (s->damping_n_s_per_m > cap) {
         s->damping_n_s_per_m = cap;
@@ -164,7 +235,7 @@ static inline double law_step(law_state *s, const law_params *p, const law_tick 
         s->damping_n_s_per_m = -cap;
     }
     if (!t->in_contact) return 0.0;
-    force = t->contact_n - bounded(s->damping_n_s_per_m * velocity);
+    double force = t->contact_n - bounded(s->damping_n_s_per_m * bounded(t->velocity_m_per_s));
     if (force < 0.0 && !p->wall_may_pull) force = 0.0;
     return force;
 }
@@ -183,7 +254,7 @@ static inline void move_and_sense(plant_state *s, const plant_params *p, double 
     s->v_m_per_s = v * p->v_per_v + f * p->v_per_f;
     double x = s->x_m;
     if (p->resolution_m > 0.0) {
-        x = (x / p->resolution_m + 6755399441055744.0 - 6755399441055744.0) * p->resolution_m;
+        x = (x / p->resolution_m + ROUND - ROUND) * p->resolution_m;
     }
     s->measured_m = x;
 }
@@ -199,7 +270,7 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
             loop->ticks = count;
             move_and_sense(plant, mechanics, loop->force_n);
             double x = plant->measured_m;
-            if (!(-1e6 < x && x < 1e6)) {
+            if (!(-FARTHEST < x && x < FARTHEST)) {
                 loop->finite = false;
                 return;
             }
@@ -221,7 +292,7 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
             }
             double force = law_step(state, law, tick);
             if (!tick->in_contact) force = 0.0;
-            if (!(-LIMIT < force && force < LIMIT)) {
+            if (!(-MOST < force && force < MOST)) {
                 loop->finite = false;
                 return;
             }

@@ -132,6 +132,7 @@ def _in_plain_words(error: NumbaError) -> str:
     said = next(
         (line for line in sentences if re.match(r"(Cannot|Unknown|No impl|Invalid|Untyped|Unsupp|Use of)", line)), ""
     )
+    said = re.sub(r"Record\([^)]*\)", "an object", said).replace("float64", "a number")
     said = said or next((line for line in sentences if not line.startswith(("Failed in", "During"))), sentences[0])
     if not places:
         return said

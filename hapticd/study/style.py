@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from contextlib import AbstractContextManager
 from typing import Any
 
 import matplotlib as mpl
@@ -47,17 +48,20 @@ RC = {
 }
 
 
-def figure(width_in: float, height_in: float, rows: int = 1, columns: int = 1, **layout: Any) -> tuple[Figure, Any]:
-    """A figure with axes, without a window.  -> figure and a 2-d array of axes."""
-    with mpl.rc_context(RC):
-        drawn = Figure(figsize=(width_in, height_in), layout="constrained")
-        FigureCanvasAgg(drawn)
-        return drawn, drawn.subplots(rows, columns, squeeze=False, **layout)
+def applied() -> AbstractContextManager[None]:
+    """The style, for as long as a figure is made."""
+    return mpl.rc_context(RC)
+
+
+def figure(width_in: float, height_in: float, rows: int = 1, columns: int = 1, **shared: Any) -> tuple[Figure, Any]:
+    """A figure without a window.  -> figure and a 2-d array of axes."""
+    drawn = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(drawn)
+    return drawn, drawn.subplots(rows, columns, squeeze=False, **shared)
 
 
 def png(drawn: Figure) -> bytes:
     """The figure as a file; the same figure gives the same bytes."""
     picture = io.BytesIO()
-    with mpl.rc_context(RC):
-        drawn.savefig(picture, format="png", metadata={"Software": None})
+    drawn.savefig(picture, format="png", metadata={"Software": None})
     return picture.getvalue()

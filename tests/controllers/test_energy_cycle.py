@@ -90,12 +90,11 @@ def test_devices_that_it_knows_nothing_of_are_held(delay_samples: int) -> None:
 
 
 def test_after_an_hour_of_contact_a_stiffer_wall_is_still_learned() -> None:
-    """Energy and motion count per cycle, so that an hour weighs no more than a second."""
+    """Energy and motion count per cycle, so that the cycles of an hour weigh no more than the last one."""
     rig = Rig(energy_cycle, Device(), drive=machine.drive)
     for second in range(3600):
         rig.change(hand_n=-2.0 - 2.0 * (second % 2))
         rig.run(1.0)
-    assert abs(rig.state.energy_j) < 0.1
     before = rig.state.damping_n_s_per_m
     rig.change(stiffness_n_per_m=20000.0)
     assert rig.run(6.0).held

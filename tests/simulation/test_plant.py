@@ -366,7 +366,7 @@ NEUTRAL: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("keys", NEUTRAL)
 def test_a_term_that_is_there_but_zero_changes_no_bit(keys: dict[str, Any]) -> None:
-    start = {"initial_velocity_m_per_s": 0.37, "viscous_n_s_per_m": 1.7, "hand": pressed(-1.3)}
+    start: dict[str, Any] = {"initial_velocity_m_per_s": 0.37, "viscous_n_s_per_m": 1.7, "hand": pressed(-1.3)}
     assert terms(SimulationOptions.model_validate({**BARE, **keys})) != terms(SimulationOptions.model_validate(BARE))
     plain, loaded = device(**start), device(**start, **keys)
     for tick in range(2000):

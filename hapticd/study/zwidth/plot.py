@@ -30,7 +30,8 @@ _COLUMNS = 3
 
 def draw(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Sequence[Curve]) -> bytes:
     """The map as a PNG file."""
-    return _draw_cells(plan, tables, found) if plan.method == "grid" else _draw_edges(plan, tables, found)
+    with style.applied():
+        return _draw_cells(plan, tables, found) if plan.method == "grid" else _draw_edges(plan, tables, found)
 
 
 def _draw_cells(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Sequence[Curve]) -> bytes:
@@ -53,11 +54,15 @@ def _draw_cells(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Seque
         _curves(panel, plan, found)
         _frame(panel, plan)
         panel.grid(visible=False)
-        panel.set_title(f"{reading.label}   {_percent(settled.mean())} settled", loc="left")
+        panel.set_title(_wrapped(reading.label), loc="left")
+        panel.set_title(f"{100.0 * settled.mean():.1f} %", loc="right", fontweight="normal")
+        panel.tick_params(labelbottom=at + columns >= len(tables))
+        if at + columns >= len(tables):
+            panel.set_xlabel(plan.x.quantity.axis_label)
+        if at % columns == 0:
+            panel.set_ylabel(plan.y.quantity.axis_label)
     for at in range(len(tables), rows * columns):
         axes[at // columns][at % columns].set_visible(False)
-    figure.supxlabel(plan.x.quantity.axis_label, fontsize=9.5)
-    figure.supylabel(plan.y.quantity.axis_label, fontsize=9.5)
     if share:
         patches = [Patch(color=style.BLUE, label="all starts settled"), Patch(color=style.PALE, label="none")]
     else:
@@ -140,5 +145,6 @@ def _cell_edges(axis: Axis) -> np.ndarray[Any, Any]:
     return np.exp(edges) if axis.logarithmic else edges
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
+def _wrapped(label: str) -> str:
+    """A law with parameters, one parameter a line."""
+    return label.replace(":", "\n:")

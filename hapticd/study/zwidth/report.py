@@ -28,9 +28,10 @@ class Summary:
         law: what the user called it.
         settled: cells that settled; with bisection, lines whose low end did.
         cells: all of them.
-        settled_share: share of the range that settled.
-        lowest_edge, median_edge: where lines stop settling; None without an edge, or where x is not the last to settle.
+        settled_share: their share.
+        lowest_edge, median_edge: where lines change; None without any edge.
         as_linear: share of cells whose verdict is the one of the exact linear limit; None where that says nothing.
+        without_edge: how many lines have no edge because all or none of them settles.
     """
 
     law: str
@@ -40,6 +41,7 @@ class Summary:
     lowest_edge: float | None
     median_edge: float | None
     as_linear: float | None
+    without_edge: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ class Report:
         cells = plan.method == "grid"
         shown = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         shown.add_column("law", overflow="fold")
-        heads = ["settled cells", "share", "as the linear limit"] if cells else ["lines", "lowest edge", "median edge"]
+        heads = ["settled cells", "share", "as the linear limit"] if cells else ["lines", "lowest edge", "median edge", "without an edge"]
         for head in heads:
             shown.add_column(head, justify="right")
         unit = f" {plan.x.quantity.unit}"
@@ -74,7 +76,8 @@ class Report:
                 row = [f"{one.settled} / {one.cells}", f"{100.0 * one.settled_share:.1f} %", linear]
             else:
                 edges = (one.lowest_edge, one.median_edge)
-                row = [str(one.cells), *("none" if edge is None else f"{edge:.5g}{unit}" for edge in edges)]
+                row = [str(one.cells), *("" if edge is None else f"{edge:.5g}{unit}" for edge in edges)]
+                row.append(", ".join(f"{count} {word} settle" for count, word in one.without_edge if count))
             shown.add_row(escape(one.law), *row)
         return shown
 
@@ -172,4 +175,5 @@ def _edge_summary(law: str, table: np.ndarray[Any, Any]) -> Summary:
         float(edges.min()) if some else None,
         float(np.median(edges)) if some else None,
         None,
+        tuple((int(np.sum((table[:, 0] == at) & (table[:, 1] == at))), word) for at, word in ((1, "all"), (0, "none"))),
     )
