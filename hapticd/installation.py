@@ -234,7 +234,7 @@ def systemd_runs() -> bool:
 
 
 def unit_states() -> list[UnitState]:
-    """The units of the service that systemd has loaded, `hapticd.service` always among them.
+    """`hapticd.service` and every instance that runs, has failed or starts with the computer.
 
     Raises:
         InstallationError: systemd cannot be asked.
@@ -248,7 +248,9 @@ def unit_states() -> list[UnitState]:
     for block in _run("systemctl", "show", f"--property={','.join(keys)}", *names).strip().split("\n\n"):
         said = dict(line.split("=", 1) for line in block.splitlines())
         name, active, enabled, text, result, restarts = (said.get(key, "") for key in keys)
-        states.append(UnitState(name, active, enabled or "not installed", text, result, int(restarts or 0)))
+        # Another unit that only mentions an instance makes systemd load it.
+        if name == "hapticd.service" or active != "inactive" or enabled != "disabled":
+            states.append(UnitState(name, active, enabled or "not installed", text, result, int(restarts or 0)))
     return states
 
 

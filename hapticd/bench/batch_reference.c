@@ -110,6 +110,7 @@ static inline void believe(law_state *s, const law_params *p) {
     double late_variance = s->late_sum_uu - mean_late_u * s->late_sum_u;
     double late_covariance = s->late_sum_uw - mean_late_u * s->sum_w;
     double variance_s = s->sum_ss - s->sum_s * s->sum_s / s->count;
+    bool braked = true;
     if (variance_s > 0.0) {
         double us = s->sum_us - mean_u * s->sum_s;
         double late_us = s->late_sum_us - mean_late_u * s->sum_s;
@@ -118,6 +119,7 @@ static inline void believe(law_state *s, const law_params *p) {
         covariance -= us * sw / variance_s;
         late_variance -= late_us * late_us / variance_s;
         late_covariance -= late_us * sw / variance_s;
+        braked = sw * variance <= us * covariance;
     }
     double explained = 0.0;
     double late_explained = 0.0;
@@ -126,7 +128,7 @@ static inline void believe(law_state *s, const law_params *p) {
         late_explained = late_covariance * late_covariance / late_variance;
     }
     if (p->force_delay == FORCE_DELAY_IDENTIFIED && (explained > 0.0 || late_explained > 0.0)) {
-        s->forces_late = late_explained > explained;
+        s->forces_late = late_explained > explained || !braked;
     }
     if (s->forces_late) {
         if (late_explained > 0.0) s->felt_mass_kg = bounded(late_variance / late_covariance);

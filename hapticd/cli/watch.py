@@ -40,7 +40,7 @@ def watch(
     endpoint: Annotated[
         str | None,
         typer.Option(
-            "--endpoint", help="Where it publishes, when not on this computer: tcp://HOST:PORT or ipc://PATH."
+            "--endpoint", help="Where it publishes, ipc://PATH or tcp://HOST:PORT; the instance's own when not given."
         ),
     ] = None,
     once: Annotated[bool, typer.Option("--once", help="Print one picture and exit.")] = False,
@@ -48,8 +48,8 @@ def watch(
 ) -> None:
     """Show live what a running daemon measures.
 
-    Waits for a daemon and finds it again after a restart. Ends with q or Ctrl-C. When the output is no terminal: one
-    plain line a second. With --once or without a terminal nothing is drawn over; --once fails when no daemon answers.
+    Waits for a daemon, and finds it again after a restart. Ends with q or Ctrl-C. Prints one plain line a second when
+    the output is no terminal. With --once it waits 3 s for a daemon and exits with 1 when none answers.
 
     Example: hapticd watch --instance default
     """

@@ -9,6 +9,7 @@ import pytest
 from hapticd.bench.batch import measure
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_the_reference_in_c_ends_in_the_same_states_to_the_last_bit() -> None:
     """When this fails after a change of the energy-cycle law, batch_reference.c has to follow it."""

@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from hapticd import registry
 from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
-from hapticd.study.paper.runs import Array, Asked, Runs
+from hapticd.study.paper.runs import Array, Asked, Runs, law_named
 from hapticd.study.verdict import Outcome
 
 _BARE: dict[str, Any] = {"model": "paper-simulation", "hand": {"force": {"profile": "constant", "newton": -5.0}}}
@@ -162,7 +161,7 @@ def ask(runs: Runs, quick: bool) -> Table:
     single = single_choices()[:2] if quick else single_choices()
     readings = single + ([] if quick else combined_choices())
     scenarios = _scenarios()
-    law = registry.law("energy-cycle")
+    law = law_named("energy-cycle")
     points = []
     for reading in readings:
         params = law.Params.model_validate(reading.params)

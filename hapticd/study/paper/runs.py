@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from hapticd.simulation.batch import Batch, BatchResult, Point
 from hapticd.study.verdict import Criterion, Outcome
 
 Array = np.ndarray[Any, Any]
+
+law_named = cache(registry.law)
+"""Laws by name; looking one up reads every installed package."""
 
 FEW_TICKS = 400_000
 """So few are run interpreted: compiling a law takes as long."""
@@ -25,7 +29,7 @@ class Asked:
     Attributes:
         points: the loops.
         outcome: the verdict on each, by the criterion of every study.
-        peak_to_peak_m, mean_depth_m, damping_n_s_per_m, settled_s, cycles, finite: as in `BatchResult`.
+        peak_to_peak_m, mean_depth_m, damping_n_s_per_m, peak_force_n, settled_s, cycles: as in `BatchResult`.
     """
 
     points: Sequence[Point]
@@ -42,6 +46,16 @@ class Asked:
         """Which points came to rest in their place."""
         settled: Array = self.outcome == Outcome.SETTLED
         return settled
+
+    def shares(self, of: Array, *shape: int) -> Array:
+        """Share of the starts, the innermost axis, for which something is so.
+
+        Args:
+            of: true or false, a value a point.
+            shape: lengths of the other axes.
+        """
+        shares: Array = of.reshape(*shape, -1).mean(axis=-1)
+        return shares
 
 
 class Runs:
@@ -86,7 +100,7 @@ class Runs:
 
 
 def _result(law: str, points: Sequence[Point], duration_s: float, progress: Callable[[int], None]) -> BatchResult:
-    batch = Batch(registry.law(law), points, duration_s, Criterion().window_s)
+    batch = Batch(law_named(law), points, duration_s, Criterion().window_s)
     if sum(duration_s / point.period_s for point in points) <= FEW_TICKS:
         result = batch.run_interpreted()
         progress(len(points))

@@ -59,7 +59,7 @@ class Scenario:
         }
         if self.lifted:
             tables["safety"] = {"profile": "simulation"}
-        head = f"# {self.figure}: {self.title}.\n"
+        head = f"# {self.figure[:1].upper()}{self.figure[1:]}: {self.title}.\n"
         head += f"#     hapticd simulate --config {self.name}.toml --duration {self.duration_s:g} --output run.csv\n\n"
         return head + tomlkit.dumps(tables)
 
@@ -151,6 +151,8 @@ SCENARIOS: dict[str, Scenario] = {
         _omega("fig9-20", "Fig. 9 c, f, i, l", "20 kN/m, energy cycles", 20e3),
         _omega("fig10", "Fig. 10", "12 kN/m, TDPA as published", 12e3, law="tdpa", params=TDPA_AS_PUBLISHED),
         _omega("fig10-bounded", "Fig. 10", "12 kN/m, TDPA with the bounds of a fair baseline", 12e3, law="tdpa"),
+        _omega("fig9-18-continuous", "eq. 16", "18 kN/m, a sensor without steps", 18e3, device={"resolution_m": 0.0}),
+        _omega("fig9-20-continuous", "eq. 16", "20 kN/m, a sensor without steps", 20e3, device={"resolution_m": 0.0}),
         _credit("credit", "energy cycles after a passive stretch", _PASSIVE),
         _credit("credit-none", "energy cycles without one", {}),
         _credit("credit-tdpa", "bounded TDPA after a passive stretch", _PASSIVE, law="tdpa"),

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from hapticd import registry
 from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
-from hapticd.study.paper.runs import Array, Asked, Runs
+from hapticd.study.paper.runs import Array, Asked, Runs, law_named
 from hapticd.study.paper.scenarios import LITERAL, NO_WINDOW, TDPA_AS_PUBLISHED
 
 DURATION_S = 6.0
@@ -29,7 +28,7 @@ NOISES_M = (0.0, 2e-6)
 OSCILLATES_M = 2e-4
 """A span that nobody would call residual quantisation [m]."""
 
-MODELS = {"paper-simulation": (-5.0, 3e3), "omega7": (-3.0, 12e3), "hapkit": (-1.0, 6e3), "falcon": (-3.0, 8e3)}
+MODELS = {"paper-simulation": (-5.0, 3e3), "omega7": (-3.0, 12e3), "hapkit": (-1.0, 6e3)}
 """Device models that differ six times in mass, with a hand [N] and a wall [N/m] that are too much for each alone."""
 
 
@@ -63,7 +62,7 @@ def press(
     keys = {"initial_position_m": drop_m, "hand": {"force": {"profile": "constant", "newton": hand_n}}, **device}
     options = SimulationOptions.model_validate(keys)
     wall = WallConfig(stiffness_n_per_m=stiffness_n_per_m)
-    law_params = registry.law(law).Params.model_validate(params or {})
+    law_params = law_named(law).Params.model_validate(params or {})
     return Point(options, wall, law_params, max_force_n=options.max_force_n or np.inf)
 
 
@@ -93,11 +92,6 @@ class Shares:
     map_hands_n: Array
     map_drops_m: Array
     maps: dict[str, Asked]
-
-    def shaped(self, asked: Asked, values: Array, *shape: int) -> Array:
-        """Values of a study with its own axes, starts last."""
-        shaped: Array = values.reshape(*shape, -1)
-        return shaped
 
 
 def ask(runs: Runs, size: Size) -> Shares:
