@@ -50,7 +50,9 @@ def command(
         socket.connect(f"ipc://{path}")
         socket.send(msgpack.packb({"do": do, **fields}))
         if not socket.poll(int(timeout_s * 1e3)):
-            raise InstanceError(f"no daemon answers on ipc://{path}: start it with `hapticd run`, or name its --instance")
+            raise InstanceError(
+                f"no daemon answers on ipc://{path}: start it with `hapticd run`, or name its --instance"
+            )
         answer: dict[str, Any] = msgpack.unpackb(socket.recv())
     finally:
         socket.close()

@@ -47,7 +47,7 @@ def law(name: str) -> ModuleType:
     elif "." in name:
         try:
             loaded = importlib.import_module(name)
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's module may do anything while it is imported
+        except (Exception, SystemExit) as error:
             raise PluginError(f"law module {name!r} cannot be imported: {type(error).__name__}: {error}") from error
     else:
         raise PluginError(
@@ -67,5 +67,7 @@ def _find(group: str, name: str) -> EntryPoint | None:
 def _load(point: EntryPoint) -> Any:
     try:
         return point.load()
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may do anything while it is imported
-        raise PluginError(f"{point.name} ({point.value}) cannot be imported: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise PluginError(
+            f"{point.name} ({point.value}) cannot be imported: {type(error).__name__}: {error}"
+        ) from error

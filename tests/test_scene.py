@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticd.config.models import SceneConfig, WallConfig
@@ -14,6 +14,9 @@ from hapticd.contracts.driver import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.control.tick import compile_walls
 from hapticd.scene import Wall
+
+
+REPEATABLE = settings(derandomize=True, deadline=None)
 
 
 def wall(stiffness_n_per_m: float = 1000.0, period_s: float = 1e-3, **keys: Any) -> Wall:
@@ -42,6 +45,7 @@ def test_the_springs_part_of_the_force_is_known_apart() -> None:
     assert damped.spring_n == 2.0
 
 
+@REPEATABLE
 @given(x_m=st.floats(-0.1, 0.1), stiffness=st.floats(0.0, 1e5), limit_n=st.floats(1e-3, 100.0) | st.just(math.inf))
 def test_stored_energy_is_the_work_of_pressing_slowly_against_the_limited_spring(
     x_m: float, stiffness: float, limit_n: float
@@ -71,10 +75,15 @@ def test_a_change_comes_at_the_first_tick_at_or_after_its_time(at_s: float) -> N
 
 @pytest.mark.parametrize("rate_hz", [1000.0, 4000.0, 8000.0])
 def test_a_change_on_a_tick_is_not_put_off_by_rounding(rate_hz: float) -> None:
-    """0.7 s is 699.9999999999999 or 700.0000000000001 periods, according to the rate; it means the 700th."""
-    for at_tick in (1, 7, 700, 5_600, 1_000_003):
-        changing = wall(1000.0, 1.0 / rate_hz, changes=[{"at_s": at_tick / rate_hz, "stiffness_n_per_m": 5.0}])
-        assert changing._changes[0][0] == at_tick
+    """1.00025 s at 4 kHz is 4001.0000000000005 periods of 250 us, as the loop counts them; it means the 4001st."""
+    period_s = round(1e9 / rate_hz) * 1e-9
+    for at_tick in (1, 7, 700, 4_001, 5_600, 1_000_003):
+        changing = wall(1000.0, period_s, changes=[{"at_s": at_tick / rate_hz, "stiffness_n_per_m": 5.0}])
+        changing._ticks = at_tick - 1
+        changing.count_tick()
+        assert changing.changes_left
+        changing.count_tick()
+        assert not changing.changes_left
 
 
 def test_changes_name_what_they_change_and_leave_the_rest() -> None:

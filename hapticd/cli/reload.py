@@ -10,7 +10,9 @@ from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 
 def reload(
     instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of the daemon."),
-    wait: bool = typer.Option(False, "--wait", help="Wait for the verdict; a refused file is printed and exits with 2."),
+    wait: bool = typer.Option(
+        False, "--wait", help="Wait for the verdict; a refused file is printed and exits with 2."
+    ),
 ) -> None:
     """Let a running daemon take its edited file over.
 

@@ -214,7 +214,7 @@ class Driver(ABC, Generic[OptionsT]):
             squared += newton * newton
         # A NaN fails every comparison, so it is refused here as well.
         if not (squared <= self._limit_squared and squared < math.inf) or len(force_n) != self._axes:
-            raise DriverStateError(f"write: {list(force_n)} N is not a force within {self._info.max_force_n if self._info else 0.0:.6g} N")
+            raise DriverStateError(f"write: {list(force_n)} N is not a force within {self.info.max_force_n:g} N")
         self._write(force_n)
 
     def disable(self) -> None:
@@ -237,7 +237,7 @@ class Driver(ABC, Generic[OptionsT]):
     def _open(self) -> DeviceInfo:
         """Find the device, greet it, learn its axes and limits."""
 
-    def _calibrate(self) -> None:  # noqa: B027 - most devices know where they are
+    def _calibrate(self) -> None:
         """Calibrate or home; may move."""
 
     @abstractmethod

@@ -1,19 +1,19 @@
 """Every error that hapticd raises on purpose.
 
-    HapticdError                     one line for the user; `exit_code` for the shell
-    ├── ConfigError                  a file, key or value that cannot be used (exit 2)
-    ├── PluginError                  a driver or law that is unknown or cannot be loaded (exit 2)
-    ├── RealtimeError                real-time rights were required and are missing
-    ├── InstanceError                another daemon holds the instance, the device or an endpoint
-    └── DriverError                  something about the device
-        ├── DeviceNotFoundError      nothing of this kind is plugged in
-        ├── DevicePermissionError    it is there, but this user may not open it
-        ├── DeviceBusyError          another process holds it
-        ├── DeviceDisconnectedError  it was there and is gone
-        ├── DeviceTimeoutError       it did not answer in time
-        ├── DeviceProtocolError      it answered something that makes no sense
-        ├── DeviceFaultError         it reports a fault of its own
-        └── DriverStateError         a call that the life cycle or the limits do not allow
+HapticdError                     one line for the user; `exit_code` for the shell
+├── ConfigError                  a file, key or value that cannot be used (exit 2)
+├── PluginError                  a driver or law that is unknown or cannot be loaded (exit 2)
+├── RealtimeError                real-time rights were required and are missing
+├── InstanceError                another daemon holds the instance, the device or an endpoint
+└── DriverError                  something about the device
+    ├── DeviceNotFoundError      nothing of this kind is plugged in
+    ├── DevicePermissionError    it is there, but this user may not open it
+    ├── DeviceBusyError          another process holds it
+    ├── DeviceDisconnectedError  it was there and is gone
+    ├── DeviceTimeoutError       it did not answer in time
+    ├── DeviceProtocolError      it answered something that makes no sense
+    ├── DeviceFaultError         it reports a fault of its own
+    └── DriverStateError         a call that the life cycle or the limits do not allow
 """
 
 from __future__ import annotations

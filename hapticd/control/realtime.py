@@ -48,11 +48,12 @@ def become_realtime(config: LoopConfig) -> tuple[list[str], list[str]]:
     gc.freeze()
     gc.disable()
     if config.realtime == "off":
-        return ["loop.realtime = \"off\": the loop runs at normal priority"], []
+        return ['loop.realtime = "off": the loop runs at normal priority'], []
     problems = []
     if _libc.mlockall(_MCL_CURRENT_AND_FUTURE):
         problems.append(
-            f"memory is not locked ({os.strerror(ctypes.get_errno())}): grant CAP_IPC_LOCK or a memlock limit of unlimited"
+            f"memory is not locked ({os.strerror(ctypes.get_errno())}): grant CAP_IPC_LOCK or a memlock limit of "
+            "unlimited"
         )
     advice = _hold_latency()
     try:

@@ -7,8 +7,10 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 INK = "#1b1f24"
 GRID = "#d9dde2"
@@ -17,6 +19,7 @@ ORANGE = "#d9822b"
 SAND = "#e9c46a"
 PALE = "#eceff2"
 GREY = "#a7afb8"
+RED = "#c8372d"
 
 SERIES = ("#2f6f9f", "#d9822b", "#4d8f5b", "#8c5aa8", "#b5483f", "#6b7684")
 """For curves, in this order; they differ in lightness as well."""
@@ -58,6 +61,13 @@ def figure(width_in: float, height_in: float, rows: int = 1, columns: int = 1, *
     drawn = Figure(figsize=(width_in, height_in), layout="constrained")
     FigureCanvasAgg(drawn)
     return drawn, drawn.subplots(rows, columns, squeeze=False, **shared)
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Numbers as they are spoken on a logarithmic axis: 1, 2, 5, 10."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def png(drawn: Figure) -> bytes:

@@ -55,7 +55,9 @@ def daemon(tmp_path: Path) -> Iterator[Daemon]:
 
 def ask(daemon: Daemon, *arguments: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
-    return subprocess.run([HAPTICD, *arguments], env=environment, capture_output=True, text=True, timeout=30)
+    return subprocess.run(
+        [HAPTICD, *arguments], env=environment, capture_output=True, text=True, timeout=30, check=False
+    )
 
 
 def edit(daemon: Daemon, config: str) -> subprocess.CompletedProcess[str]:
@@ -113,7 +115,9 @@ def test_a_wall_that_stiffens_in_the_file_stiffens_under_the_hand_by_a_ramp(daem
         ("[[[", "line 1"),
     ],
 )
-def test_a_file_that_cannot_be_used_changes_nothing_and_names_the_place(daemon: Daemon, broken: str, named: str) -> None:
+def test_a_file_that_cannot_be_used_changes_nothing_and_names_the_place(
+    daemon: Daemon, broken: str, named: str
+) -> None:
     with Subscriber(daemon.endpoint) as subscriber:
         before = subscriber.until("hapticd/status")
         answer = edit(daemon, broken)
@@ -160,7 +164,7 @@ def test_a_law_that_raises_is_latched_until_cleared_and_armed_again(daemon: Daem
 
 def test_no_daemon_is_one_line(tmp_path: Path) -> None:
     environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(tmp_path)}
-    answer = subprocess.run([HAPTICD, "arm"], env=environment, capture_output=True, text=True, timeout=30)
+    answer = subprocess.run([HAPTICD, "arm"], env=environment, capture_output=True, text=True, timeout=30, check=False)
     assert answer.returncode == 1
     assert answer.stderr.count("\n") == 1
     assert "hapticd run" in answer.stderr

@@ -42,7 +42,7 @@ def step(state, params, tick):
 
 
 Report = Callable[[str, object], None]
-"""pytest's record_property: how long a reaction took, for `pytest --junit-xml`; machines differ, so nothing asserts it."""
+"""pytest's record_property: how long a reaction took, for `pytest --junit-xml`; nothing asserts it."""
 
 
 def pressing(daemon: Daemon) -> None:

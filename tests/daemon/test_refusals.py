@@ -6,7 +6,6 @@ import os
 import shutil
 import socket
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -74,7 +73,7 @@ def test_an_unknown_driver_is_named_with_those_installed() -> None:
 
 
 def test_walls_on_two_axes_of_a_single_axis_device_are_named() -> None:
-    walls = '[[scene.walls]]\naxis = "x"\nstiffness_n_per_m = 1.0\n[[scene.walls]]\naxis = "y"\nstiffness_n_per_m = 1.0\n'
+    walls = "".join(f'[[scene.walls]]\naxis = "{axis}"\nstiffness_n_per_m = 1.0\n' for axis in "xy")
     with Daemon(walls) as daemon:
         code, lines = refused(daemon)
         assert code == 2

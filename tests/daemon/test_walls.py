@@ -10,8 +10,6 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import zmq
-
 from tests.daemon.running import Daemon, Subscriber
 
 AT_ONCE = 12

@@ -59,7 +59,11 @@ class Machine:
                 start_new_session=True,
             )
         self._leader = 0
-        wait_until(self._booted, "the machine to boot")
+        try:
+            wait_until(self._booted, "the machine to boot")
+        except BaseException:
+            self.power_off()
+            raise
 
     def run(
         self, *command: str, check: bool = True, user: str | None = None, given: str = ""
@@ -116,22 +120,27 @@ class Machine:
 
     def power_off(self) -> None:
         """Switch it off."""
-        with contextlib.suppress(AssertionError):
+        if self._leader:
             self.run("systemctl", "poweroff", check=False)
         try:
-            self._nspawn.wait(PATIENCE_S)
+            self._nspawn.wait(PATIENCE_S if self._leader else 0.0)
         except subprocess.TimeoutExpired:
-            self._nspawn.send_signal(signal.SIGKILL)
-            os.kill(self._leader, signal.SIGKILL)
+            for pid in (self._nspawn.pid, self._leader):
+                if pid:
+                    os.kill(pid, signal.SIGKILL)
             self._nspawn.wait()
 
     def _booted(self) -> bool:
         assert self._nspawn.poll() is None, f"the machine did not boot: {self._log.read_text()}"
         children = Path(f"/proc/{self._nspawn.pid}/task/{self._nspawn.pid}/children").read_text().split()
         self._leader = int(children[0]) if children else 0
-        # Before it has a root of its own, a command would meet the host's systemd.
-        if not self._leader or self.path("/").samefile("/") or not self.path("/run/systemd/system").is_dir():
-            return False
+        # Before it has a root of its own, a command would meet the host's systemd; and nspawn's first child goes away.
+        with contextlib.suppress(FileNotFoundError):
+            own_root = self._leader and not self.path("/").samefile("/") and self.path("/run/systemd/system").is_dir()
+            return bool(own_root) and self._is_running()
+        return False
+
+    def _is_running(self) -> bool:
         return self.run("systemctl", "is-system-running", check=False).stdout.strip() in {"running", "degraded"}
 
 

@@ -127,15 +127,15 @@ def test_everything_is_installed_and_nothing_is_started(machine: Machine) -> Non
 
 def test_it_is_ready_only_when_the_loop_ticks(machine: Machine) -> None:
     packages = next(machine.path("/opt/hapticd/lib").glob("python3*")) / "site-packages"
-    (packages / "slowlab.py").write_text(SLOW_LAW)
-    machine.path(CONFIG).write_text(PRESSED + '[controller]\nlaw = "slowlab"\n')
+    (packages / "mylab").mkdir()
+    (packages / "mylab/slow.py").write_text(SLOW_LAW)
+    machine.path(CONFIG).write_text(PRESSED + '[controller]\nlaw = "mylab.slow"\n')
     machine.run("systemctl", "start", "--no-block", "hapticd")
     eventually(lambda: machine.show("hapticd", "MainPID") != "0", "the daemon's process", machine)
     time.sleep(3.0)  # an ordinary start takes one
     assert machine.show("hapticd", "ActiveState") == "activating"
     machine.run("systemctl", "stop", "hapticd")
     machine.run("systemctl", "reset-failed", "hapticd", check=False)
-    (packages / "slowlab.py").unlink()
 
     with Service(machine) as service:
         assert service.show("ActiveState") == "active"

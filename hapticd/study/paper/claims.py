@@ -13,9 +13,6 @@ from hapticd.study.paper.recording import Figures, Recording
 from hapticd.study.paper.starts import Shares
 
 HELD = ("fig9-12", "fig9-18", "fig9-20")
-LONG_S = 60.0
-"""How long a contact is watched for a bound on what it generates [s]."""
-
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
@@ -24,7 +21,7 @@ class Evidence:
     Attributes:
         runs: recordings by the name of their scenario.
         figures: their numbers.
-        long: some of them for `LONG_S`.
+        long: some of them again, much longer.
         shares: the studies over many starts.
         table: the readings.
     """

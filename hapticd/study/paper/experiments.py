@@ -66,7 +66,7 @@ def _unstable_alone(evidence: Evidence) -> Claim:
         "Without a controller stable contact with 12 kN/m is impossible",
         f"fig8, and no law under {_HANDS}, {len(evidence.shares.drops_m)} starts each",
         f"{millimetres(evidence.figures['fig8'].peak_to_peak_m)} peak to peak in fig8; "
-        f"{percent(float(share.mean()))} of all starts oscillate",
+        f"starts that oscillate: {percent(float(share.mean()))}",
         bool(share.min() > 0.8),
     )
 
@@ -125,9 +125,7 @@ def _window_shares(evidence: Evidence) -> np.ndarray:
 def _held(evidence: Evidence) -> Claim:
     held = evidence.shares.held
     shares = held.shares(held.settled, len(HELD_N_PER_M), len(HANDS_N))
-    parts = [
-        f"{k * 1e-3:g} kN/m {percent(float(share.mean()))}" for k, share in zip(HELD_N_PER_M, shares, strict=True)
-    ]
+    parts = [f"{k * 1e-3:g} kN/m {percent(float(share.mean()))}" for k, share in zip(HELD_N_PER_M, shares, strict=True)]
     return Claim(
         "held",
         "Fig. 9",
@@ -151,7 +149,7 @@ def _gain(evidence: Evidence) -> Claim:
         f"{20e3 / alone:.3g} times: {percent(at_20)} of the starts rest at 20 kN/m, none oscillates alone at "
         f"{alone * 1e-3:g} kN/m",
         at_20 > 0.99 and alone == 8e3,
-        "The paper reports 20 kN/m as the highest it tried to success; the model has its own limit: hapticd study zwidth.",
+        "20 kN/m is the highest that the paper reports; where the model's own limit is, hapticd study zwidth shows.",
     )
 
 
@@ -290,10 +288,11 @@ def _credit(evidence: Evidence) -> Claim:
         "Section III",
         "TDPA's observer accumulates credit during passive stretches; the method accumulates none",
         "credit, credit-none, credit-tdpa, credit-tdpa-none",
-        f"after a second that leaves {credit_j * 1e3:.0f} mJ, TDPA first damps {delays['credit-tdpa'] * 1e3:.0f} ms after "
-        f"the hand has moved, without that second {delays['credit-tdpa-none'] * 1e3:.0f} ms; energy cycles settle after "
-        f"{settles['credit'] * 1e3:.0f} and {settles['credit-none'] * 1e3:.0f} ms",
-        delays["credit-tdpa"] > 2.0 * delays["credit-tdpa-none"] and settles["credit"] <= settles["credit-none"] + 0.05,
+        f"a credit of {credit_j * 1e3:.0f} mJ keeps TDPA from damping for {delays['credit-tdpa'] * 1e3:.0f} ms after the "
+        f"hand has moved, without one it waits {delays['credit-tdpa-none'] * 1e3:.0f} ms; energy cycles settle in "
+        f"{settles['credit'] * 1e3:.0f} ms, {settles['credit-none'] * 1e3:.0f} ms without the passive stretch",
+        bool(delays["credit-tdpa"] > 2.0 * delays["credit-tdpa-none"])
+        and bool(settles["credit"] <= settles["credit-none"] + 0.05),
     )
 
 

@@ -75,7 +75,7 @@ class Recording:
         return difference
 
     def cycle_ends(self, window: int) -> list[int]:
-        """Ticks at which a cycle has ended, by a time window of so many samples: the minimum itself, not its detection."""
+        """Ticks of the minima that end a cycle, by a time window of so many samples on either side."""
         fields = {"window_energy_j": 0.0, "window_minimum_j": 0.0, "window_falls": 0, "window_rises": 0}
         state: Any = plain_object("Window", fields)
         ends = []

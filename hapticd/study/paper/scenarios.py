@@ -13,7 +13,7 @@ TDPA_AS_PUBLISHED: dict[str, Any] = {"damping_cap_n_s_per_m": 0.0, "min_speed_m_
 """Time-domain passivity control without any bound."""
 
 LITERAL: dict[str, Any] = {"work": "total", "cap": "none"}
-"""Energy cycles with the energy that the paper plots, E_tot of the whole wall force, and nothing to bound the damping."""
+"""Energy cycles with the energy that the paper plots, E_tot of the whole wall force, and no bound on the damping."""
 
 NO_WINDOW: dict[str, Any] = {"window": 1}
 """Every change of sign of the power ends a cycle."""

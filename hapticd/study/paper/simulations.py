@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticd.study.paper.claims import LONG_S, Claim, Evidence, millimetres, percent
+from hapticd.study.paper.claims import Claim, Evidence, millimetres, percent
 from hapticd.study.paper.recording import Recording
 from hapticd.study.paper.starts import MODELS
 from hapticd.study.verdict import Outcome
@@ -90,13 +90,14 @@ def _bounded(evidence: Evidence, continuous: bool) -> Claim:
     worst = max(more_j, key=lambda name: more_j[name])
     lowest_j = min(float(evidence.long[name].energy_j.min()) for name in names)
     holds = more_j[worst] < _MORE_J
+    long_s = len(evidence.long[worst].t_s) * evidence.long[worst].period_s
     return Claim(
         "bounded-generation" if continuous else "bounded-generation-quantised",
         "eqs. 11-16",
         "The energy that the wall generates stays within a finite bound"
         + (", position not quantised" if continuous else ", position in steps of 10 um as on the device"),
-        f"{', '.join(names)}, {LONG_S:g} s",
-        f"lowest energy {lowest_j * 1e3:.3g} mJ; from {LONG_S / 2:g} to {LONG_S:g} s it falls by up to "
+        f"{', '.join(names)}, {long_s:g} s",
+        f"lowest energy {lowest_j * 1e3:.3g} mJ; from {long_s / 2:g} to {long_s:g} s it falls by up to "
         f"{more_j[worst] * 1e3:.2g} mJ",
         holds,
         ""

@@ -100,7 +100,7 @@ def ask(runs: Runs, size: Size) -> Shares:
     hands_n = -np.linspace(0.25, 8.0, size.map_hands)
     map_drops_m = np.linspace(0.0, DROP_M, size.map_starts)
     unbounded = TDPA_AS_PUBLISHED
-    readings = ({**LITERAL}, {})
+    readings: Sequence[dict[str, Any]] = (LITERAL, {})
     windows: Sequence[dict[str, Any]] = (NO_WINDOW, {})
     return Shares(
         drops_m=drops_m,
@@ -110,9 +110,7 @@ def ask(runs: Runs, size: Size) -> Shares:
         held=runs.ask(
             "energy-cycle", [press(k, hand, drop) for k in HELD_N_PER_M for hand in HANDS_N for drop in drops_m]
         ),
-        tdpa=runs.ask(
-            "tdpa", [press(k, -3.0, drop, unbounded, "tdpa") for k in HELD_N_PER_M for drop in drops_m]
-        ),
+        tdpa=runs.ask("tdpa", [press(k, -3.0, drop, unbounded, "tdpa") for k in HELD_N_PER_M for drop in drops_m]),
         tdpa_bounded=runs.ask("tdpa", [press(k, -3.0, drop, law="tdpa") for k in HELD_N_PER_M for drop in drops_m]),
         window=runs.ask(
             "energy-cycle",

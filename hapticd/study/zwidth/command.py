@@ -63,7 +63,7 @@ def command(
 
     from hapticd.study.grid.job import kept, run
     from hapticd.study.verdict import Criterion
-    from hapticd.study.zwidth.laws import parse_laws
+    from hapticd.study.laws import parse_laws
     from hapticd.study.zwidth.plane import QUANTITIES, parse_axis
     from hapticd.study.zwidth.plot import draw
     from hapticd.study.zwidth.report import report

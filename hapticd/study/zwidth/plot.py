@@ -24,7 +24,11 @@ _COLOURS = {
     Outcome.MOVING: style.PALE,
     Outcome.DIVERGED: style.GREY,
 }
-_DASHES: dict[str, Any] = {"stable": "-", "passive": (0, (5, 2)), "quantised-passive": (0, (1.2, 1.4))}
+_LINES: dict[str, dict[str, Any]] = {
+    "stable": {"color": style.INK, "linestyle": "-", "linewidth": 1.8},
+    "passive": {"color": style.ORANGE, "linestyle": (0, (5, 3)), "linewidth": 1.8},
+    "quantised-passive": {"color": style.RED, "linestyle": (0, (1.2, 1.6)), "linewidth": 2.0},
+}
 _COLUMNS = 3
 
 
@@ -84,8 +88,9 @@ def _draw_edges(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Seque
     for at, (table, reading) in enumerate(zip(tables, plan.readings, strict=True)):
         colour = style.SERIES[at % len(style.SERIES)]
         x = edge_middles(plan.x, table) * plan.x.quantity.shown_scale
-        panel.plot(x, y, color=colour, linewidth=2.2, marker="o", markersize=2.6)
-        handles.append(Line2D([], [], color=colour, linewidth=2.2, marker="o", markersize=3.5, label=reading.label))
+        width = 1.4 + 5.0 * (len(tables) - 1 - at) / len(tables)  # the last is the thinnest, so that all can be seen
+        panel.plot(x, y, color=colour, linewidth=width, solid_capstyle="butt", clip_on=False)
+        handles.append(Line2D([], [], color=colour, linewidth=width, label=reading.label))
     _curves(panel, plan, found)
     _frame(panel, plan)
     panel.margins(0.0)
@@ -107,27 +112,25 @@ def edge_middles(axis: Axis, table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any
 
 
 def _curves(panel: Axes, plan: Plan, found: Sequence[Curve]) -> None:
-    for curve in found:
-        for line in curve.lines:
-            x, y = np.array(line).T
-            scaled = (x * plan.x.quantity.shown_scale, y * plan.y.quantity.shown_scale)
-            # a light edge keeps a dark line legible on any ground
-            panel.plot(*scaled, color="white", linewidth=2.8, alpha=0.7)
-            panel.plot(*scaled, color=style.INK, linewidth=1.3, linestyle=_DASHES[curve.key])
+    scale_x, scale_y = plan.x.quantity.shown_scale, plan.y.quantity.shown_scale
+    lines = [(curve, np.array(line).T * [[scale_x], [scale_y]]) for curve in found for line in curve.lines]
+    for _, line in lines:
+        panel.plot(*line, color="white", linewidth=3.4)  # a line then shows on any ground
+    for curve, line in lines:
+        panel.plot(*line, **_LINES[curve.key])
 
 
 def _curve_handles(found: Sequence[Curve]) -> list[Line2D]:
-    return [
-        Line2D([], [], color=style.INK, linewidth=1.3, linestyle=_DASHES[curve.key], label=curve.label)
-        for curve in found
-    ]
+    return [Line2D([], [], label=curve.label, **_LINES[curve.key]) for curve in found]
 
 
 def _frame(panel: Axes, plan: Plan) -> None:
     if plan.x.logarithmic:
         panel.set_xscale("log")
+        style.plain_ticks(panel.xaxis)
     if plan.y.logarithmic:
         panel.set_yscale("log")
+        style.plain_ticks(panel.yaxis)
     x, y = (_cell_edges(axis) for axis in (plan.x, plan.y))
     panel.set_xlim(x[0], x[-1])
     panel.set_ylim(y[0], y[-1])
@@ -147,4 +150,4 @@ def _cell_edges(axis: Axis) -> np.ndarray[Any, Any]:
 
 def _wrapped(label: str) -> str:
     """A law with parameters, one parameter a line."""
-    return label.replace(":", "\n:")
+    return label.replace(":", "\n")

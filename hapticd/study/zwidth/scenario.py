@@ -18,6 +18,7 @@ from hapticd.contracts.law import LawParams
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd.study.boundaries import Loop
+from hapticd.study.laws import toml_value
 from hapticd.study.verdict import Criterion, balance_m, coulomb_n, pressing_n
 
 
@@ -119,14 +120,6 @@ def with_values(text: str, name: str, given: Sequence[str], keys: dict[str, str]
         path = keys.get(key.strip(), key.strip())
         _put(data, path, toml_value(value), one)
     return tomlkit.dumps(data)
-
-
-def toml_value(text: str) -> Any:
-    """A value as TOML reads it; what is none is a string."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text.strip()
 
 
 def _put(data: dict[str, Any], path: str, value: Any, given: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import ModuleType
@@ -12,7 +13,6 @@ from hapticd.config.problems import Problems
 from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.law import LawParams
 from hapticd.simulation.compile import compiled_step
-from hapticd.study.zwidth.scenario import toml_value
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,3 +75,11 @@ def parse_laws(text: str, base: Mapping[str, Mapping[str, Any]], option: str = "
     for reading in readings:
         compiled_step(reading.law)
     return readings
+
+
+def toml_value(text: str) -> Any:
+    """A value as TOML reads it; what is none is a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()

@@ -1,0 +1,1 @@
+"""Many random devices under every law: who settles, who does not, and why."""

@@ -1,0 +1,78 @@
+"""Which laws, and which readings of each, stand in the table."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterator
+from typing import Any, Literal
+
+from hapticd import registry
+from hapticd.contracts.errors import PluginError
+from hapticd.contracts.law import LawParams
+from hapticd.simulation.compile import compiled_step
+from hapticd.study.laws import Reading
+from hapticd.study.robustness.devices import Device
+
+PAPER = "energy-cycle"
+
+_UNBOUNDED = {"damping_cap_n_s_per_m": 0.0, "min_speed_m_per_s": 0.0}
+# What one change from the default does not show.
+_COMBINED: dict[str, tuple[dict[str, Any], ...]] = {
+    "tdpa": (_UNBOUNDED, {**_UNBOUNDED, "observer": "printed", "reset": "never"}),
+    PAPER: (
+        {"window": 1},
+        {"cap": "fixed", "cap_damping_n_s_per_m": 50.0},
+        {"sum": "start", "rule": "signed", "cap": "none"},
+        {"sum": "start", "rule": "non-negative", "cap": "none"},
+        {"sum": "start", "cap": "none"},
+    ),
+}
+
+
+def every_reading() -> list[Reading]:
+    """Every installed law with its defaults, and the readings of those that leave a choice: the paper's law comes last.
+
+    Of the paper's law: each choice that is not the default, alone, and some combinations that are known.
+    """
+    names = sorted(registry.names(registry.CONTROLLERS), key=lambda name: (name == PAPER, name != "none", name))
+    found = []
+    for name in names:
+        try:
+            compiled_step(registry.law(name))
+        except PluginError:
+            if name in (PAPER, "none"):
+                raise
+            continue  # somebody else's law, and it is not asked for by name
+        found += [_reading(name, values) for values in ({}, *_choices(name))]
+    return found
+
+
+def params_on(reading: Reading, device: Device) -> LawParams:
+    """The parameters on a device: a law that wants to know the mass is told what the maker could know."""
+    values = dict(reading.values)
+    if values.get("cap") == "known-mass":
+        values.setdefault("mass_kg", device.options.mass_kg)
+    params: LawParams = reading.law.Params.model_validate(values)
+    return params
+
+
+def _reading(name: str, values: dict[str, Any]) -> Reading:
+    given = (f"{key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in values.items())
+    return Reading(":".join([name, *given]), name, values)
+
+
+def _choices(name: str) -> list[dict[str, Any]]:
+    found = list(_alone(registry.law(name).Params)) if name == PAPER else []
+    return found + [values for values in _COMBINED.get(name, ()) if values not in found]
+
+
+def _alone(model: type[LawParams]) -> Iterator[dict[str, Any]]:
+    for key, info in model.model_fields.items():
+        options: tuple[Any, ...] = ()
+        if typing.get_origin(info.annotation) is Literal:
+            options = typing.get_args(info.annotation)
+        elif info.annotation is bool:
+            options = (True, False)
+        for option in options:
+            if option != info.default:
+                yield {key: option}
