@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -14,9 +15,12 @@ from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 
 
 def run(
-    config: Path | None = typer.Option(
-        None, "--config", "-c", help="Configuration file; /etc/hapticd/hapticd.toml or the shipped one when not given."
-    ),
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            "--config", "-c", help="Configuration file; /etc/hapticd/hapticd.toml or the shipped one if absent."
+        ),
+    ] = None,
     instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of this daemon, one a device."),
     watch: bool = typer.Option(False, "--watch", help="Show live what it measures; end both with q."),
 ) -> None:

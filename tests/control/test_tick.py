@@ -302,7 +302,7 @@ DEEDS = st.sampled_from(
 )
 
 
-@settings(REPEATABLE, max_examples=150)
+@settings(REPEATABLE, max_examples=400)
 @given(path=st.lists(st.tuples(DEEDS, st.integers(1, 15), MOVES), min_size=1, max_size=25))
 def test_whatever_is_asked_in_whatever_order_the_force_goes_by_ramps(path: list[tuple[str, int, float]]) -> None:
     """Motion explains k dx for each wall, and a blind moment a tenth of the limit; the rest is ramps.
@@ -458,6 +458,19 @@ def test_a_blind_moment_in_the_middle_of_a_transition_goes_to_zero_in_tenths(nam
     forces += rig.forces(-2e-3, 60)
     assert largest_step(forces[after:]) <= abs(forces[after - 1]) / 10.0 + 1e-12
     assert forces[after + 10 :] == [0.0] * 60
+
+
+@pytest.mark.parametrize("name", TRANSITIONS)
+def test_a_transition_that_comes_while_blind_changes_nothing_of_how_the_force_is_let_out(name: str) -> None:
+    rig = pressed()
+    forces = [4.0, *rig.forces(math.nan, 3)]
+    TRANSITIONS[name][0](rig)
+    forces += rig.forces(math.nan, 3)
+    TRANSITIONS[name][0](rig)
+    forces += rig.forces(-2e-3, 30)
+    assert forces == pytest.approx([4.0 * max(0.0, 1.0 - count / 10.0) for count in range(37)], abs=1e-12)
+    assert rig.tick.guard.mode is Mode.DISARMED
+    assert rig.tick.guard.latched
 
 
 def test_arming_a_blind_device_fails_anew_and_never_pushes() -> None:
