@@ -17,6 +17,7 @@ COMMANDS: Final = {
     "run": "Run the daemon in the foreground until it is interrupted.",
     "check": "Say whether configuration files can be used.",
     "config": "Describe the configuration file, or show one in full.",
+    "doctor": "Say what keeps this computer from running a good loop.",
     "devices": "List the installed device drivers and their options.",
     "controllers": "List the installed laws and their parameters.",
     "watch": "Show live what a running daemon measures.",
@@ -26,6 +27,7 @@ COMMANDS: Final = {
     "reload": "Let a running daemon take its edited file over.",
     "service": "Install, show or remove the system service.",
     "simulate": "Run a configuration offline on the simulated device.",
+    "study": "Put laws to the test offline, over many runs.",
     "bench": "Measure tick and simulator against a reference.",
 }
 """Every command with its line in the overview. `hapticd.cli.NAME` has a function NAME, or `app` when it has its own."""

@@ -16,6 +16,7 @@ class EventCode(enum.IntEnum):
     CLEARED = 104
     STOPPING = 105
     REFUSED = 106
+    DEVICE_FOUND = 107
 
     LAW_FAILED = 200
     LAW_OVER_BUDGET = 201
@@ -26,10 +27,13 @@ class EventCode(enum.IntEnum):
     DEVICE_FAULT = 206
     SUPERVISOR_STALLED = 207
     CONTROL_LOST = 208
+    LOOP_LATE = 209
 
     OVERRUN_BURST = 300
     RING_DROPPED = 301
     NOT_REALTIME = 302
+    FAULT_RECORD_FAILED = 303
+    SUBSCRIBER_FLOOD = 304
 
 
 @dataclass(slots=True)
@@ -49,3 +53,8 @@ class Event:
     seq: int
     deadline_ns: int
     fields: dict[str, float | int | str] = field(default_factory=dict)
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether it took the force away."""
+        return 200 <= self.code < 300

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable
 from typing import Any
 
 from hapticd.config.models import LoopConfig, SafetyConfig
 from hapticd.contracts.driver import Driver, DriverState, Sample
-from hapticd.contracts.errors import DriverError
+from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.control.letters import Letters
+from hapticd.control.predecessor import Predecessor
 from hapticd.control.shared import (
     CONTROL_BEAT,
     DONE,
@@ -31,7 +33,10 @@ STOP_RAMP_S = 0.05
 """Longest ramp to zero at a stop [s]: whoever killed the supervisor may not have the patience for more."""
 
 BURST_TICKS = 10
-"""Deadlines skipped in one go that are worth an event."""
+"""Deadlines skipped in one go that are worth an event, one a second at most."""
+
+LATE_S = 0.05
+"""A real device is released when so much more time was skipped than kept: its last force was held all the while [s]."""
 
 
 class ControlLoop:
@@ -45,6 +50,7 @@ class ControlLoop:
         safety: the [safety] table.
         auto_arm: arm as soon as the loop runs.
         sleep_until: sleeps to a CLOCK_MONOTONIC time [ns].
+        before: where the loop before stopped, when this one goes on for it.
 
     Attributes:
         stop_requested: set by a signal or a letter; the force is ramped to zero and the loop ends.
@@ -59,6 +65,7 @@ class ControlLoop:
         safety: SafetyConfig,
         auto_arm: bool,
         sleep_until: Callable[[int], None],
+        before: Predecessor = Predecessor(),
     ) -> None:
         self.driver = driver
         self.tick = tick
@@ -66,9 +73,12 @@ class ControlLoop:
         self.loop = loop
         self.safety = safety
         self.stop_requested = False
-        self.law_count = 0
-        self.seq = 0
+        self.law_count = before.law
+        self.seq = before.seq
+        self._skipped = before.skipped
+        tick.guard.latched = before.latched
         self._deadline_ns = 0
+        self._burst_due_ns = 0
         self._sleep_until = sleep_until
         self._auto_arm = auto_arm
         self._area = shared.record_area
@@ -102,10 +112,28 @@ class ControlLoop:
         try:
             self._run()
         except DriverError as error:
-            self.event(EventCode.DEVICE_LOST, f"device lost: {error}")
+            if isinstance(error, DeviceFaultError):
+                self.event(EventCode.DEVICE_FAULT, f"the device reports a fault: {error}")
+            else:
+                self.event(EventCode.DEVICE_LOST, f"device lost: {error}")
             raise
         finally:
             self.driver.close()
+
+    def _start(self) -> None:
+        """Find out where the device is, and arm it where that needs no one's word."""
+        try:
+            self.tick.start(self.driver.read())
+        except HapticdError:
+            raise
+        except Exception as error:
+            raise _nonsense(error) from error
+        self.event(EventCode.STARTED, f"the loop runs at {self.loop.rate_hz:g} Hz", rate_hz=self.loop.rate_hz)
+        if self._auto_arm:
+            try:
+                self.arm()
+            except DriverError as error:
+                self.event(EventCode.DISARMED, f"stays disarmed: {error}")
 
     def _run(self) -> None:
         driver = self.driver
@@ -123,14 +151,13 @@ class ControlLoop:
         budget_ns = int(self.loop.law_budget * period_ns)
         stall_ns = int(self.safety.supervisor_stall_s * 1e9)
         all_ticks = (1 << BUDGET_TICKS) - 1
+        most_late = max(BURST_TICKS, int(LATE_S * 1e9) // period_ns)
         misses = 0
-        skipped = 0
+        late = 0
+        words[SKIPPED] = skipped = self._skipped
         busy_us = 0.0
 
-        tick.start(read())
-        self.event(EventCode.STARTED, f"the loop runs at {self.loop.rate_hz:g} Hz", rate_hz=self.loop.rate_hz)
-        if self._auto_arm:
-            self.arm()
+        self._start()
         # Deadlines are whole multiples of the period, so that an outside witness can share them.
         deadline_ns = monotonic_ns() // period_ns * period_ns + 2 * period_ns
         last_ns = deadline_ns - period_ns
@@ -140,16 +167,21 @@ class ControlLoop:
             woke_ns = monotonic_ns()
             self._deadline_ns = deadline_ns
 
-            sample = read()
-            force_n = step(sample, (woke_ns - last_ns) * 1e-9)
-            if guard.mode is not Mode.DISARMED:
-                write(force_n)
-            last_ns = woke_ns
+            try:
+                sample = read()
+                force_n = step(sample, (woke_ns - last_ns) * 1e-9)
+                if guard.mode is not Mode.DISARMED:
+                    write(force_n)
+                last_ns = woke_ns
 
-            if tick.fault:
-                self._report_fault()
-            busy_us = (monotonic_ns() - woke_ns) * 1e-3
-            self._record(sample, deadline_ns, (woke_ns - deadline_ns) * 1e-3, busy_us, skipped)
+                if tick.fault:
+                    self._report_fault()
+                busy_us = (monotonic_ns() - woke_ns) * 1e-3
+                self._record(sample, deadline_ns, (woke_ns - deadline_ns) * 1e-3, busy_us, skipped)
+            except HapticdError:
+                raise
+            except Exception as error:  # a law's are caught in the tick, so this is the driver's
+                raise _nonsense(error) from error
             words[CONTROL_BEAT] = woke_ns
 
             if words[MAIL] != words[DONE]:
@@ -177,8 +209,14 @@ class ControlLoop:
                 skipped += behind
                 deadline_ns += behind * period_ns
                 words[SKIPPED] = skipped
-                if behind >= BURST_TICKS:
+                late += behind
+                if late >= most_late and guard.mode is Mode.ARMED and not tick.info.simulated:
+                    tick.fail(EventCode.LOOP_LATE, f"{late} more deadlines were missed than met")
+                elif behind >= BURST_TICKS and now_ns >= self._burst_due_ns:
+                    self._burst_due_ns = now_ns + 1_000_000_000
                     self.event(EventCode.OVERRUN_BURST, f"{behind} deadlines were missed at once", skipped=behind)
+            elif late:
+                late -= 1
 
             used_ns = thread_time_ns()
             misses = misses << 1 & all_ticks
@@ -261,3 +299,9 @@ class ControlLoop:
         if tick.fault:
             self.event(EventCode(tick.fault), tick.fault_text)
             tick.fault = 0
+
+
+def _nonsense(error: Exception) -> DriverError:
+    """What a driver raised that is no error of a driver, or what came of a sample that is none."""
+    traceback.print_exc()
+    return DeviceProtocolError(f"its driver failed: {type(error).__name__}: {error}")

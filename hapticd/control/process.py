@@ -1,12 +1,14 @@
 """The control process: what runs behind `python -m hapticd.control.process`.
 
-The supervisor starts it with one end of a socket pair as its descriptor `--socket`, and sends the configuration
-text. It answers once, with what it found and the descriptor of the shared memory, or with why it cannot run.
+The supervisor starts it with the configuration's text on its standard input and one end of a socket pair as its
+descriptor `--socket`. It answers with one packet: what it found and the descriptor of the shared memory, or why it
+cannot run.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import gc
 import os
 import signal
@@ -23,10 +25,11 @@ from hapticd import registry
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import MAX_WALLS
 from hapticd.contracts.driver import DeviceInfo, Sample
-from hapticd.contracts.errors import ConfigError, HapticdError, PluginError
+from hapticd.contracts.errors import ConfigError, DriverError, HapticdError, PluginError
 from hapticd.contracts.record import RecordLayout
 from hapticd.control.contact import RunningLaw
 from hapticd.control.loop import ControlLoop
+from hapticd.control.predecessor import Predecessor
 from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
 from hapticd.control.shared import SUPERVISOR_BEAT, SharedMemory
 from hapticd.control.tick import ControlTick
@@ -34,26 +37,11 @@ from hapticd.guard import Guard
 
 WARM_UP_TICKS = 200
 
+DEVICE_LOST = 3
+"""Exit code: the device is gone, and may come back."""
 
-def receive(channel: socket.socket, head: bytes = b"") -> dict[str, Any]:
-    """One length-prefixed msgpack map from a socket.
-
-    Args:
-        channel: the socket.
-        head: the length, where it has been read already.
-
-    Raises:
-        EOFError: the other side is gone.
-    """
-    length = int.from_bytes(head or _exactly(channel, 4), "little")
-    received: dict[str, Any] = msgpack.unpackb(_exactly(channel, length))
-    return received
-
-
-def packed(message: dict[str, Any]) -> bytes:
-    """A length-prefixed msgpack map."""
-    body: bytes = msgpack.packb(message)
-    return len(body).to_bytes(4, "little") + body
+LARGEST_ANSWER = 1 << 16
+_LONGEST_ERROR = 1 << 14
 
 
 def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
@@ -94,17 +82,24 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     channel = socket.socket(fileno=arguments.socket)
     try:
-        return _serve(channel, arguments.parent)
+        control = _prepare(channel, arguments.parent)
     except HapticdError as error:
-        channel.sendall(packed({"error": str(error), "exit_code": error.exit_code}))
+        with contextlib.suppress(ConnectionError):
+            channel.send(msgpack.packb({"error": str(error)[:_LONGEST_ERROR], "exit_code": error.exit_code}))
         return error.exit_code
-    except EOFError:
-        return 1
+    except ConnectionError:
+        return 1  # the supervisor is gone
+    try:
+        control.run()
+    except DriverError:
+        return DEVICE_LOST  # the event says why
+    return 0
 
 
-def _serve(channel: socket.socket, parent_pid: int) -> int:
-    request = receive(channel)
+def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
+    request = msgpack.unpackb(sys.stdin.buffer.read())
     config = parse(request["text"], request["name"])
+    before = Predecessor(**request["before"])
     settings = config.config
     driver = config.driver(config.options, settings.loop.period_s)
     place_device(config, driver)
@@ -120,8 +115,9 @@ def _serve(channel: socket.socket, parent_pid: int) -> int:
             shared,
             settings.loop,
             settings.safety,
-            info.simulated or settings.safety.auto_arm,
+            (info.simulated or settings.safety.auto_arm) and before.may_arm,
             make_sleeper(),
+            before,
         )
         for name, law in _installed_laws().items():
             control.letters.know(name, law)
@@ -136,12 +132,12 @@ def _serve(channel: socket.socket, parent_pid: int) -> int:
         problems, advice = become_realtime(settings.loop)
         shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
         hello = {"info": asdict(info), "realtime": not problems, "warnings": problems + advice, "pid": os.getpid()}
-        socket.send_fds(channel, [packed(hello)], [shared.descriptor])
+        socket.send_fds(channel, [msgpack.packb(hello)], [shared.descriptor])
+        channel.close()
     except BaseException:
         driver.close()
         raise
-    control.run()
-    return 0
+    return control
 
 
 def _check_watchdog(config: LoadedConfig, info: DeviceInfo) -> None:
@@ -175,16 +171,6 @@ def _warm_up(tick: ControlTick) -> None:
         sample.position_m[:] = [depth_m] * len(tick.info.axes)
         tick.step(sample, tick.period_s)
     gc.collect()
-
-
-def _exactly(channel: socket.socket, length: int) -> bytes:
-    received = b""
-    while len(received) < length:
-        part = channel.recv(length - len(received))
-        if not part:
-            raise EOFError("the supervisor is gone")
-        received += part
-    return received
 
 
 if __name__ == "__main__":

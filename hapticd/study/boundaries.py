@@ -2,7 +2,7 @@
 
     m a + b v = F + F_hand,     F(n) = -K x(n-d) - B (x(n-d) - x(n-d-1)) / T,     held over a period T
 
-A limit is the largest K [N/m]; 0 where no stiffness will do, infinite where any will, NaN where the formula says nothing.
+A limit is the largest K [N/m]: 0 where no stiffness will do, infinite where any will, NaN where a formula is silent.
 """
 
 from __future__ import annotations

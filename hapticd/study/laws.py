@@ -68,7 +68,9 @@ def parse_laws(text: str, base: Mapping[str, Mapping[str, Any]], option: str = "
             raise ConfigError(*problems.lines)
         readings.append(Reading(label, name, values))
     if not readings:
-        raise ConfigError(f"{option}: name at least one law; installed: {', '.join(registry.names(registry.CONTROLLERS))}")
+        raise ConfigError(
+            f"{option}: name at least one law; installed: {', '.join(registry.names(registry.CONTROLLERS))}"
+        )
     labels = [reading.label for reading in readings]
     if len(set(labels)) < len(labels):
         raise ConfigError(f"{option} {text}: a law stands there twice")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -24,7 +25,7 @@ RED = "#c8372d"
 SERIES = ("#2f6f9f", "#d9822b", "#4d8f5b", "#8c5aa8", "#b5483f", "#6b7684")
 """For curves, in this order; they differ in lightness as well."""
 
-RC = {
+RC: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.titlesize": 10.0,
@@ -56,16 +57,22 @@ def applied() -> AbstractContextManager[None]:
     return mpl.rc_context(RC)
 
 
-def figure(width_in: float, height_in: float, rows: int = 1, columns: int = 1, **shared: Any) -> tuple[Figure, Any]:
-    """A figure without a window.  -> figure and a 2-d array of axes."""
+def blank(width_in: float, height_in: float) -> Figure:
+    """A figure without axes, and without a window."""
     drawn = Figure(figsize=(width_in, height_in), layout="constrained")
     FigureCanvasAgg(drawn)
+    return drawn
+
+
+def figure(width_in: float, height_in: float, rows: int = 1, columns: int = 1, **shared: Any) -> tuple[Figure, Any]:
+    """A figure with a 2-d array of axes."""
+    drawn = blank(width_in, height_in)
     return drawn, drawn.subplots(rows, columns, squeeze=False, **shared)
 
 
-def plain_ticks(axis: Axis) -> None:
-    """Numbers as they are spoken on a logarithmic axis: 1, 2, 5, 10."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+def plain_ticks(axis: Axis, steps: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
+    """Numbers as they are spoken on a logarithmic axis: 1, 2, 5, 10; over many decades 1, 10, 100."""
+    axis.set_major_locator(LogLocator(subs=steps))
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
 

@@ -54,8 +54,8 @@ class Criterion:
         """The criterion in a sentence."""
         return (
             f"settled: over the last {self.window_s:g} s the true position spans at most {self.still_m * 1e3:g} mm or "
-            f"{self.still_counts:g} steps of the sensor, and the mean depth is within {self.place_share * 100.0:g} % or "
-            f"{self.place_counts:g} steps of where hand force and springs balance, friction allowed for"
+            f"{self.still_counts:g} steps of the sensor, and the mean depth is within {self.place_share * 100.0:g} % "
+            f"or {self.place_counts:g} steps of where hand force and springs balance, friction allowed for"
         )
 
     def declared(self) -> dict[str, Any]:

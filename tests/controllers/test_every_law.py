@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import random
 import struct
+import sys
 import typing
+from collections.abc import Generator
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -45,6 +49,27 @@ def readings(law: ModuleType) -> list[LawParams]:
     """The defaults, and every other choice for itself."""
     others = [{name: choice} for name, each in choices(law).items() for choice in each]
     return [law.Params(), *(law.Params.model_validate(other) for other in others)]
+
+
+@pytest.fixture
+def example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[ModuleType]:
+    """The law that docs/controllers.md shows."""
+    page = (Path(__file__).parents[2] / "docs" / "controllers.md").read_text()
+    (tmp_path / "law_of_the_docs.py").write_text(page.split("```python\n")[1].split("```")[0])
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield importlib.import_module("law_of_the_docs")
+    del sys.modules["law_of_the_docs"]
+
+
+def test_the_example_of_the_docs_is_a_law(example: ModuleType) -> None:
+    check_law(example)
+    steady = Device(stiffness_n_per_m=12e3, x_m=0.002)
+    plain = Rig(example, steady)
+    assert plain.run(3.0).held
+    assert not Rig(none, steady).run(3.0).held
+    compiled = Rig(example, steady, drive=machine.drive)
+    compiled.run(3.0)
+    assert bits(plain.plant) == bits(compiled.plant)
 
 
 def bits(plain: Any) -> dict[str, bytes]:

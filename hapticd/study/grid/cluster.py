@@ -6,14 +6,16 @@ import logging
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from typing import Any
 
-from distributed import CancelledError, Client, KilledWorker, as_completed, get_worker
+import distributed
 
 from hapticd.contracts.errors import ConfigError, HapticdError
 from hapticd.study.grid.job import Job, Work, code_digest
 from hapticd.study.grid.journal import Row
 
 _ANSWERS_WITHIN_S = 15
+_dask: Any = distributed  # its types are incomplete
 _ONE_AT_A_TIME = threading.Lock()
 
 
@@ -33,40 +35,42 @@ def blocks(address: str, job: Job, wanted: Sequence[int]) -> Iterator[tuple[int,
     """
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here in one line
     try:
-        client = Client(address, timeout=_ANSWERS_WITHIN_S, set_as_default=False)
+        client = _dask.Client(address, timeout=_ANSWERS_WITHIN_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ConfigError(f"--cluster {address}: no dask scheduler answers there ({_first_line(error)})") from None
     with closing(client):
         try:
             client.wait_for_workers(1, timeout=_ANSWERS_WITHIN_S)
         except TimeoutError:
-            raise ConfigError(f"--cluster {address}: the scheduler has no workers; start some: dask worker {address}") from None
+            raise ConfigError(
+                f"--cluster {address}: the scheduler has no workers; start some: dask worker {address}"
+            ) from None
         digest = code_digest(job.work, job.laws)
         futures = {
             client.submit(_block, job.work, job.spec, block, job.laws, digest, pure=False): block for block in wanted
         }
         try:
-            for future in as_completed(list(futures)):
+            for future in _dask.as_completed(list(futures)):
                 block = futures.pop(future)  # and with it the worker's copy of the rows
                 yield block, future.result()
         except HapticdError:
             raise
-        except KilledWorker as error:
+        except distributed.KilledWorker as error:
             raise HapticdError(f"--cluster {address}: gave up on a block that killed its workers: {error}") from None
-        except (OSError, CancelledError) as error:
+        except (OSError, distributed.CancelledError) as error:
             raise HapticdError(
                 f"--cluster {address}: lost the scheduler ({_first_line(error)}); finished cells are kept, the same "
                 "command goes on from there"
             ) from None
         except ImportError as error:
             raise HapticdError(
-                f"--cluster {address}: a worker lacks a module: {error}; install the same hapticd[study] on every worker"
+                f"--cluster {address}: a worker lacks a module: {error}; install the same hapticd[study] on all of them"
             ) from None
 
 
 def _block(work: Work, spec: object, block: int, laws: tuple[str, ...], digest: str) -> list[Row]:
     """One block on a worker; the engine has threads of its own, so only one block at a time in a process."""
-    worker = get_worker()
+    worker = _dask.get_worker()
     if code_digest(work, laws) != digest:
         raise HapticdError(
             f"worker {worker.address} has another hapticd or another law of that name: install the same everywhere"

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from hapticd.study.paper.claims import HELD, Evidence
 from hapticd.study.paper.starts import HANDS_N, NATIVE_N_PER_M, OSCILLATES_M
-from hapticd.study.paper.style import BLUE, GREEN, GREY, ORANGE, OUTCOMES, PURPLE, RED, WIDTH_IN
+from hapticd.study.paper.style import BLUE, GREEN, GREY, INK, ORANGE, OUTCOMES, PURPLE, RED, WIDTH_IN
+from hapticd.study.style import figure as sheet
 from hapticd.study.verdict import Outcome
 
 _COLOURS = (GREEN, BLUE, ORANGE)
@@ -21,7 +20,7 @@ def native_limit(evidence: Evidence) -> Figure:
     """Span at the end against stiffness, without a law, a dot a start."""
     shares = evidence.shares
     spans_mm = shares.native.peak_to_peak_m.reshape(len(NATIVE_N_PER_M), len(HANDS_N), -1) * 1e3
-    figure, axes = plt.subplots(figsize=(WIDTH_IN, 3.0))
+    figure, ((axes,),) = sheet(WIDTH_IN, 3.0)
     for row, at in enumerate(np.arange(len(NATIVE_N_PER_M))):
         for hand, (newton, colour) in enumerate(zip(HANDS_N, _COLOURS, strict=True)):
             spread = (np.linspace(-0.1, 0.1, spans_mm.shape[2]) if spans_mm.shape[2] > 1 else 0.0) + 0.25 * (hand - 1)
@@ -45,11 +44,13 @@ def tdpa_map(evidence: Evidence) -> Figure:
     """How far the device still moves, over hand force and start, under three laws."""
     shares = evidence.shares
     shape = (len(shares.map_hands_n), len(shares.map_drops_m))
-    figure, grid = plt.subplots(2, 3, figsize=(WIDTH_IN, 4.9), sharex=True, sharey=True)
+    figure, grid = sheet(WIDTH_IN, 4.9, 2, 3, sharex=True, sharey=True)
     edges = (_edges(shares.map_drops_m * 1e3), _edges(-shares.map_hands_n))
     for column, (name, asked) in enumerate(shares.maps.items()):
         spans_mm = np.clip(asked.peak_to_peak_m.reshape(shape) * 1e3, 1e-3, 1e2)
-        spans = grid[0, column].pcolormesh(*edges, spans_mm, norm=LogNorm(3e-3, 30.0), cmap="cividis_r", rasterized=True)
+        spans = grid[0, column].pcolormesh(
+            *edges, spans_mm, norm=LogNorm(3e-3, 30.0), cmap="cividis_r", rasterized=True
+        )
         grid[1, column].pcolormesh(*edges, asked.outcome.reshape(shape), cmap=OUTCOMES, vmin=-0.5, vmax=3.5)
         grid[0, column].set_title(name)
         grid[1, column].set_xlabel("start above the wall [mm]")
@@ -65,7 +66,7 @@ def tdpa_map(evidence: Evidence) -> Figure:
 
 def damping_at_speed(evidence: Evidence) -> Figure:
     """The damping in force against the speed at which it acts: where TDPA goes wrong."""
-    figure, axes = plt.subplots(figsize=(WIDTH_IN, 2.9))
+    figure, ((axes,),) = sheet(WIDTH_IN, 2.9)
     drawn = [("fig10", "TDPA as published", RED), ("fig10-bounded", "TDPA, bounded", ORANGE)]
     drawn += [(name, f"energy cycles, {name[-2:]} kN/m", colour) for name, colour in zip(HELD, _COLOURS, strict=True)]
     for name, label, colour in drawn:
@@ -86,9 +87,7 @@ def damping_at_speed(evidence: Evidence) -> Figure:
 
 def long_contact(evidence: Evidence) -> Figure:
     """Energy of a long contact, with and without steps of the position."""
-    figure, (all_of_it, motion) = plt.subplots(
-        1, 2, figsize=(WIDTH_IN, 2.8), gridspec_kw={"width_ratios": (1.6, 1.0)}
-    )
+    figure, ((all_of_it, motion),) = sheet(WIDTH_IN, 2.8, 1, 2, width_ratios=(1.6, 1.0))
     colours = dict(zip(HELD, _COLOURS, strict=True))
     for name, run in evidence.long.items():
         stiffness = f"{run.scenario.stiffness_n_per_m * 1e-3:g} kN/m"
@@ -114,7 +113,7 @@ def readings(evidence: Evidence) -> Figure:
     """Every reading against every scenario."""
     table = evidence.table
     rows = len(table.readings)
-    figure, axes = plt.subplots(figsize=(WIDTH_IN, 2.3 + 0.155 * rows))
+    figure, ((axes,),) = sheet(WIDTH_IN, 2.3 + 0.155 * rows)
     axes.pcolormesh(table.outcome, cmap=OUTCOMES, vmin=-0.5, vmax=3.5, edgecolors="white", lw=0.6)
     axes.set_yticks(np.arange(rows) + 0.5, [reading.name for reading in table.readings], fontsize=7.0)
     axes.set_xticks(np.arange(len(table.scenarios)) + 0.5, table.scenarios, rotation=90, fontsize=7.0)
@@ -126,21 +125,18 @@ def readings(evidence: Evidence) -> Figure:
     for row, passed in enumerate(table.passed):
         axes.text(len(table.scenarios) + 0.3, row + 0.5, f"{passed}", va="center", fontsize=7.0, color=_grade(passed))
     if table.single < rows:
-        axes.axhline(table.single, color="#1f2933", lw=1.0)
-    axes.axvline(4, color="#1f2933", lw=1.0)
+        axes.axhline(table.single, color=INK, lw=1.0)
+    axes.axvline(4, color=INK, lw=1.0)
     handles = [Patch(color=OUTCOMES(int(outcome)), label=outcome.words) for outcome in Outcome]
     figure.legend(handles=handles, loc="outside lower center", ncol=4)
     return figure
 
 
 def _grade(passed: int) -> str:
-    return GREEN if passed == 28 else RED if passed < 14 else "#1f2933"
+    return GREEN if passed == 28 else RED if passed < 14 else INK
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
     """Edges of cells around these centres, equally far apart."""
     half = 0.5 * (centres[1] - centres[0])
     return np.append(centres - half, centres[-1] + half)
-
-
-_ = Axes

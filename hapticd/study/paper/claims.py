@@ -14,6 +14,7 @@ from hapticd.study.paper.starts import Shares
 
 HELD = ("fig9-12", "fig9-18", "fig9-20")
 
+
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """Everything that has been run.

@@ -288,8 +288,8 @@ def _credit(evidence: Evidence) -> Claim:
         "Section III",
         "TDPA's observer accumulates credit during passive stretches; the method accumulates none",
         "credit, credit-none, credit-tdpa, credit-tdpa-none",
-        f"a credit of {credit_j * 1e3:.0f} mJ keeps TDPA from damping for {delays['credit-tdpa'] * 1e3:.0f} ms after the "
-        f"hand has moved, without one it waits {delays['credit-tdpa-none'] * 1e3:.0f} ms; energy cycles settle in "
+        f"a credit of {credit_j * 1e3:.0f} mJ keeps TDPA from damping for {delays['credit-tdpa'] * 1e3:.0f} ms after "
+        f"the hand has moved, without one it waits {delays['credit-tdpa-none'] * 1e3:.0f} ms; energy cycles settle in "
         f"{settles['credit'] * 1e3:.0f} ms, {settles['credit-none'] * 1e3:.0f} ms without the passive stretch",
         bool(delays["credit-tdpa"] > 2.0 * delays["credit-tdpa-none"])
         and bool(settles["credit"] <= settles["credit-none"] + 0.05),

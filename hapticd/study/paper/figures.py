@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from hapticd.study.paper.claims import HELD, Evidence
 from hapticd.study.paper.recording import Array, Recording
 from hapticd.study.paper.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, WIDTH_IN, limits, shade_wall
+from hapticd.study.style import figure as sheet
 
 _MARK = {"marker": "v", "ls": "none", "ms": 4.0, "mec": "white", "mew": 0.4, "zorder": 5}
 
@@ -19,7 +20,8 @@ _MARK = {"marker": "v", "ls": "none", "ms": 4.0, "mec": "white", "mew": 0.4, "zo
 def leak(evidence: Evidence) -> Figure:
     """Fig. 3: position, power and energy of a wall without a controller."""
     run = evidence.runs["fig3"]
-    figure, (position, power, energy) = plt.subplots(3, 1, figsize=(WIDTH_IN, 5.6), sharex=True)
+    figure, grid = sheet(WIDTH_IN, 5.6, 3, sharex=True)
+    position, power, energy = grid[:, 0]
     shown = run.t_s <= 1.0
     t_s = run.t_s[shown]
     _position(position, run, shown)
@@ -30,7 +32,7 @@ def leak(evidence: Evidence) -> Figure:
     power.legend(loc="upper left", ncol=2)
     _energy(energy, run, shown)
     ends = [0, *(end for end in run.cycle_ends(2) if shown[end])]
-    for before, end in zip(ends, ends[1:], strict=False):
+    for before, end in pairwise(ends):
         levels = run.energy_j[[before, end]] * 1e3
         energy.plot([run.t_s[before], run.t_s[end]], [levels[0]] * 2, color=PURPLE, lw=0.6, ls=":")
         energy.plot([run.t_s[end]] * 2, levels, color=PURPLE, lw=2.0, solid_capstyle="butt")
@@ -42,8 +44,11 @@ def leak(evidence: Evidence) -> Figure:
 
 def converging(evidence: Evidence) -> Figure:
     """Fig. 6: position, energy and damping of an undamped mass, sets 1 and 2."""
-    figure, grid = plt.subplots(3, 2, figsize=(WIDTH_IN, 5.8), sharex=True, sharey="row")
-    sets = ([("fig6-set1", BLUE, "")], [("fig6-set2-wall", BLUE, "active wall"), ("fig6-set2-device", ORANGE, "device")])
+    figure, grid = sheet(WIDTH_IN, 5.8, 3, 2, sharex=True, sharey="row")
+    sets = (
+        [("fig6-set1", BLUE, "")],
+        [("fig6-set2-wall", BLUE, "active wall"), ("fig6-set2-device", ORANGE, "active device")],
+    )
     titles = ("set 1: undamped", "set 2: −1 N s/m from 0.2 s on")
     for column, (runs, title) in enumerate(zip(sets, titles, strict=True)):
         for name, colour, label in runs:
@@ -65,7 +70,7 @@ def without_window(evidence: Evidence) -> Figure:
     """Fig. 7: false cycles and what they do, with and without the window, in two readings."""
     names = ("fig7", "fig7-literal", "fig7-literal-window")
     titles = ("spring energy, capped\nno window", "E_tot, no cap\nno window", "E_tot, no cap\nwindow 2+2")
-    figure, grid = plt.subplots(3, 3, figsize=(WIDTH_IN, 5.8))
+    figure, grid = sheet(WIDTH_IN, 5.8, 3, 3)
     for column, (name, title) in enumerate(zip(names, titles, strict=True)):
         run = evidence.runs[name]
         shown = run.t_s <= 1.0
@@ -95,7 +100,8 @@ def without_window(evidence: Evidence) -> Figure:
 def uncontrolled(evidence: Evidence) -> Figure:
     """Fig. 8: position and energy at 12 kN/m without a law."""
     run = evidence.runs["fig8"]
-    figure, (position, energy) = plt.subplots(2, 1, figsize=(WIDTH_IN, 3.6), sharex=True)
+    figure, grid = sheet(WIDTH_IN, 3.6, 2, sharex=True)
+    position, energy = grid[:, 0]
     shown = run.t_s <= 2.0
     _position(position, run, shown)
     _energy(energy, run, shown)
@@ -108,7 +114,7 @@ def uncontrolled(evidence: Evidence) -> Figure:
 
 def controlled(evidence: Evidence) -> Figure:
     """Fig. 9: position, energy, damping and force at 12, 18 and 20 kN/m."""
-    figure, grid = plt.subplots(4, 3, figsize=(WIDTH_IN, 7.2), sharex=True, sharey="row")
+    figure, grid = sheet(WIDTH_IN, 7.2, 4, 3, sharex=True, sharey="row")
     for column, name in enumerate(HELD):
         run = evidence.runs[name]
         shown = run.t_s <= 0.5
@@ -129,7 +135,7 @@ def controlled(evidence: Evidence) -> Figure:
 
 def passivity_control(evidence: Evidence) -> Figure:
     """Fig. 10: TDPA at 12 kN/m, as published and bounded."""
-    figure, grid = plt.subplots(4, 2, figsize=(WIDTH_IN, 7.0), sharex=True)
+    figure, grid = sheet(WIDTH_IN, 7.0, 4, 2, sharex=True)
     for column, (name, title) in enumerate((("fig10", "as published"), ("fig10-bounded", "bounded"))):
         run = evidence.runs[name]
         shown = run.t_s <= 2.0
@@ -151,8 +157,8 @@ def passivity_control(evidence: Evidence) -> Figure:
 
 def displayed_stiffness(evidence: Evidence) -> Figure:
     """Fig. 11: force over depth, of the true and of the measured position."""
-    figure, grid = plt.subplots(1, 3, figsize=(WIDTH_IN, 2.6), sharex=True, sharey=True)
-    for axes, name in zip(grid, HELD, strict=True):
+    figure, grid = sheet(WIDTH_IN, 2.6, 1, 3, sharex=True, sharey=True)
+    for axes, name in zip(grid[0], HELD, strict=True):
         run = evidence.runs[name]
         stiffness = run.scenario.stiffness_n_per_m
         shown = (run.t_s <= 0.5) & run.in_contact
@@ -165,9 +171,9 @@ def displayed_stiffness(evidence: Evidence) -> Figure:
         axes.axhline(stiffness * 1e-3, color=GREY, lw=0.9, ls="--", label="commanded")
         axes.set_title(f"{stiffness * 1e-3:g} kN/m")
         axes.set_xlabel("time [s]")
-    grid[0].set_ylim(0.0, 30.0)
-    grid[0].set_ylabel("displayed stiffness\n[kN/m]")
-    grid[0].legend(loc="upper right", fontsize=7.0)
+    grid[0, 0].set_ylim(0.0, 30.0)
+    grid[0, 0].set_ylabel("displayed stiffness\n[kN/m]")
+    grid[0, 0].legend(loc="upper right", fontsize=7.0)
     return figure
 
 

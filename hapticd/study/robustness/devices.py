@@ -24,8 +24,8 @@ WITHIN_REACH = 0.8
 
 DRAWN = (
     "mass 0.15-0.5 kg, viscous friction 1-6 N s/m, position steps of 1-30 um, wall 4-30 kN/m, 0.5-4 kHz, constant hand "
-    "force 0.5-8 N of a limit of 12 N, 4 in 10 start at the wall and the others up to 15 mm above it, 3 in 10 held by a "
-    "hand (up to 0.1 kg, 0.5-4 N s/m, up to 200 N/m), 2 in 10 with Coulomb friction of 0.02-0.3 N, 3 in 10 with one "
+    "force 0.5-8 N of a limit of 12 N, 4 in 10 start at the wall and the others up to 15 mm above it, 3 in 10 held by "
+    "a hand (up to 0.1 kg, 0.5-4 N s/m, up to 200 N/m), 2 in 10 with Coulomb friction of 0.02-0.3 N, 3 in 10 with one "
     "sample of force delay that no law is told of, 2 in 10 against a wall that stiffens half-way from 0.3-0.8 of it"
 )
 
@@ -72,6 +72,11 @@ class Device:
         """The wall at its stiffest, which is at the end [N/m]."""
         last = self.wall.changes[-1].stiffness_n_per_m if self.wall.changes else None
         return self.wall.stiffness_n_per_m if last is None else last
+
+    @property
+    def last_change_s(self) -> float:
+        """When the wall stiffens; 0 when it does not [s]."""
+        return self.wall.changes[-1].at_s if self.wall.changes else 0.0
 
     @property
     def hand_n(self) -> float:
@@ -157,15 +162,16 @@ def draw(seed: int, index: int) -> Device:
         "max_force_n": MAX_FORCE_N,
     }
     hand: dict[str, Any] = {"force": {"profile": "constant", "newton": -uniform(0.5, 8.0)}}
-    drop_m, held = uniform(0.0, 0.015), {
-        "mass_kg": uniform(0.0, 0.1),
-        "damping_n_s_per_m": uniform(0.5, 4.0),
-        "stiffness_n_per_m": uniform(0.0, 200.0),
-    }
-    coulomb_n, softer = uniform(0.02, 0.3), uniform(0.3, 0.8)
-    drops, is_held, rubs, late, stiffens = (
-        source.random() < share for share in (0.6, 0.3, 0.2, 0.3, 0.2)
+    drop_m, held = (
+        uniform(0.0, 0.015),
+        {
+            "mass_kg": uniform(0.0, 0.1),
+            "damping_n_s_per_m": uniform(0.5, 4.0),
+            "stiffness_n_per_m": uniform(0.0, 200.0),
+        },
     )
+    coulomb_n, softer = uniform(0.02, 0.3), uniform(0.3, 0.8)
+    drops, is_held, rubs, late, stiffens = (source.random() < share for share in (0.6, 0.3, 0.2, 0.3, 0.2))
     if drops:
         options["initial_position_m"] = drop_m
     if is_held:

@@ -24,7 +24,6 @@ _COMBINED: dict[str, tuple[dict[str, Any], ...]] = {
         {"cap": "fixed", "cap_damping_n_s_per_m": 50.0},
         {"sum": "start", "rule": "signed", "cap": "none"},
         {"sum": "start", "rule": "non-negative", "cap": "none"},
-        {"sum": "start", "cap": "none"},
     ),
 }
 
@@ -57,7 +56,7 @@ def params_on(reading: Reading, device: Device) -> LawParams:
 
 
 def _reading(name: str, values: dict[str, Any]) -> Reading:
-    given = (f"{key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in values.items())
+    given = (f"{key}={_shown(value)}" for key, value in values.items())
     return Reading(":".join([name, *given]), name, values)
 
 
@@ -76,3 +75,10 @@ def _alone(model: type[LawParams]) -> Iterator[dict[str, Any]]:
         for option in options:
             if option != info.default:
                 yield {key: option}
+
+
+def _shown(value: object) -> str:
+    """A value as `--laws` takes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -25,7 +25,7 @@ COLUMNS = (
     "felt_mass_kg",
     "peak_force_n",
 )
-"""Of each device: positive `misplaced_m` is too deep."""
+"""Of each device: positive `misplaced_m` is too deep, and `settled_s` counts from the last change of the wall."""
 
 _MOST_DEVICES = 250
 
@@ -69,9 +69,7 @@ class Plan:
         return [np.array(in_order(sizes, found)) for found in each]
 
 
-def pressed(
-    devices: Sequence[Device], reading: Reading, criterion: Criterion, threads: int | None = None
-) -> list[Row]:
+def pressed(devices: Sequence[Device], reading: Reading, criterion: Criterion, threads: int | None = None) -> list[Row]:
     """The row of each device under a reading."""
     points = [device.point(params_on(reading, device), criterion) for device in devices]
     result = Batch(reading.law, points, DURATION_S, criterion.window_s, ledger=False).run(threads)
@@ -80,7 +78,7 @@ def pressed(
             criterion.judge(points, result),
             result.peak_to_peak_m,
             misplaced_m(points, result),
-            result.settled_s,
+            result.settled_s - [device.last_change_s for device in devices],
             result.damping_n_s_per_m,
             result.felt_mass_kg,
             result.peak_force_n,

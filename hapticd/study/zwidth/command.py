@@ -43,9 +43,7 @@ def command(
     still: Annotated[float, typer.Option(help="Largest span of the position that counts as still [m].")] = 5e-5,
     place: Annotated[float, typer.Option(help="Largest error of the depth that counts as in place, a share.")] = 0.1,
     output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("zwidth"),
-    cluster: Annotated[
-        str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")
-    ] = None,
+    cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,
 ) -> None:
@@ -62,8 +60,8 @@ def command(
         require_extra("cluster", "distributed")
 
     from hapticd.study.grid.job import kept, run
-    from hapticd.study.verdict import Criterion
     from hapticd.study.laws import parse_laws
+    from hapticd.study.verdict import Criterion
     from hapticd.study.zwidth.plane import QUANTITIES, parse_axis
     from hapticd.study.zwidth.plot import draw
     from hapticd.study.zwidth.report import report
@@ -88,14 +86,18 @@ def command(
     loaded = parse(text, name)
     scenario_of(loaded)
     readings = parse_laws(laws, {loaded.config.controller.law: loaded.config.controller.params})
-    plan = Plan(text, name, readings, across, upwards, method, duration, starts, Criterion(still_m=still, place_share=place))
+    plan = Plan(
+        text, name, readings, across, upwards, method, duration, starts, Criterion(still_m=still, place_share=place)
+    )
     require_folder(output, _FILES)
 
     job = plan.job()
     with kept(job, output / "zwidth.journal", fresh) as journal:
         blocks = run(job, journal, "zwidth", cluster)
         found = report(plan, plan.tables(blocks))
-        for file, content in zip(_FILES, (found.csv(), found.json(), draw(plan, found.tables, found.curves)), strict=True):
+        for file, content in zip(
+            _FILES, (found.csv(), found.json(), draw(plan, found.tables, found.curves)), strict=True
+        ):
             write(output / file, content)
     if as_json:
         typer.echo((output / "zwidth.json").read_text(), nl=False)

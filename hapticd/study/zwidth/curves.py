@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from contourpy import contour_generator
@@ -41,7 +42,9 @@ def curves(scenario: Scenario, x: Axis, y: Axis) -> list[Curve]:
     return found
 
 
-def limits(boundary: Boundary, scenario: Scenario, x: Axis, y: Axis) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def limits(
+    boundary: Boundary, scenario: Scenario, x: Axis, y: Axis
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """The limit over the stiffness that the wall has, for every cell: one row a y; below 1 is beyond the limit."""
     return np.array([[_margin(boundary, put_both(scenario, x, y, at, row)) for at in x.values] for row in y.values])
 
@@ -60,7 +63,8 @@ def _lines(boundary: Boundary, scenario: Scenario, x: Axis, y: Axis) -> list[lis
     if len(fine_x.values) < 2 or len(fine_y.values) < 2:
         return []
     heights = np.log(np.clip(limits(boundary, scenario, fine_x, fine_y), 1e-9, 1e9))
-    found = contour_generator(fine_x.values, fine_y.values, np.ma.masked_invalid(heights)).lines(0.0)
+    contours = contour_generator(fine_x.values, fine_y.values, np.ma.masked_invalid(heights))
+    found: Any = contours.lines(0.0)
     return [[(float(px), float(py)) for px, py in line] for line in found]
 
 

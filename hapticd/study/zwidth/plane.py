@@ -113,7 +113,9 @@ def parse_axis(text: str, cells: int, option: str) -> Axis:
             raise ValueError
         low, high = float(found[2]), float(found[3])
     except ValueError:
-        raise ConfigError(f"{option} {text}: must be NAME=LOW..HIGH or NAME=LOW..HIGH:log, as stiffness=1e3..40e3") from None
+        raise ConfigError(
+            f"{option} {text}: must be NAME=LOW..HIGH or NAME=LOW..HIGH:log, as stiffness=1e3..40e3"
+        ) from None
     quantity = named(found[1], option)
     for value in (low, high):
         quantity.check(value, f"{option} {text}")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap, ListedColormap
+from matplotlib.colors import BoundaryNorm, Colormap, LinearSegmentedColormap, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -48,6 +48,7 @@ def _draw_cells(plan: Plan, tables: Sequence[np.ndarray[Any, Any]], found: Seque
         settled = table[:, 0] == Outcome.SETTLED
         shape = (len(plan.y.values), len(plan.x.values))
         edges = (_cell_edges(plan.x), _cell_edges(plan.y))
+        colours: Colormap
         if share:
             colours = LinearSegmentedColormap.from_list("share", [style.PALE, style.BLUE])
             panel.pcolormesh(*edges, table[:, 1].reshape(shape) / plan.starts, cmap=colours, vmin=0.0, vmax=1.0)

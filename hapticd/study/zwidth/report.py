@@ -66,7 +66,11 @@ class Report:
         cells = plan.method == "grid"
         shown = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         shown.add_column("law", overflow="fold")
-        heads = ["settled cells", "share", "as the linear limit"] if cells else ["lines", "lowest edge", "median edge", "without an edge"]
+        heads = (
+            ["settled cells", "share", "as the linear limit"]
+            if cells
+            else ["lines", "lowest edge", "median edge", "without an edge"]
+        )
         for head in heads:
             shown.add_column(head, justify="right")
         unit = f" {plan.x.quantity.unit}"
@@ -109,9 +113,7 @@ class Report:
                     }
                     for one, table in zip(self.summaries, self.tables, strict=True)
                 ],
-                "boundaries": [
-                    {"key": curve.key, "label": curve.label, "lines": curve.lines} for curve in self.curves
-                ],
+                "boundaries": [{"key": curve.key, "label": curve.label, "lines": curve.lines} for curve in self.curves],
             }
         )
 
@@ -119,10 +121,12 @@ class Report:
         """One line a cell; with bisection, a line a line."""
         plan = self.plan
         if plan.method == "grid":
-            return as_csv(
-                ("law", plan.x.quantity.column, plan.y.quantity.column, *GRID_COLUMNS), self._cells()
-            )
-        columns = ("law", plan.y.quantity.column, *(name.replace("edge", plan.x.quantity.column) for name in EDGE_COLUMNS))
+            return as_csv(("law", plan.x.quantity.column, plan.y.quantity.column, *GRID_COLUMNS), self._cells())
+        columns = (
+            "law",
+            plan.y.quantity.column,
+            *(name.replace("edge", plan.x.quantity.column) for name in EDGE_COLUMNS),
+        )
         return as_csv(columns, self._lines())
 
     def _cells(self) -> Iterator[list[Any]]:

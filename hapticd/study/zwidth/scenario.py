@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import tomllib
@@ -130,7 +131,7 @@ def _put(data: dict[str, Any], path: str, value: Any, given: str) -> None:
         value = {"profile": "constant", "newton": -float(value)}
     place: Any = data
     try:
-        for step, after in zip(steps, steps[1:], strict=False):
+        for step, after in itertools.pairwise(steps):
             if isinstance(place, dict):
                 place = place.setdefault(step, [] if isinstance(after, int) else {})
             else:

@@ -14,8 +14,8 @@ from hapticd.config.loading import parse
 from hapticd.simulation.batch import Batch, Point
 from hapticd.study.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd.study.grid.journal import Row
-from hapticd.study.verdict import Criterion, Outcome, misplaced_m
 from hapticd.study.laws import Reading
+from hapticd.study.verdict import Criterion, Outcome, misplaced_m
 from hapticd.study.zwidth.plane import Axis, axis_of
 from hapticd.study.zwidth.scenario import Scenario, scenario_of
 

@@ -1,0 +1,74 @@
+"""The configuration: usable or not, and what the other checks need of it even when it is not."""
+
+from __future__ import annotations
+
+import contextlib
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from hapticd.config.loading import LoadedConfig, load
+from hapticd.config.models import DeviceConfig, LoopConfig, TelemetryConfig
+from hapticd.contracts.errors import ConfigError
+from hapticd.doctor.finding import Finding, ok, problem
+from hapticd.share import directory
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the daemon would be asked for.
+
+    Attributes:
+        path: the file.
+        loop: its loop, by default where the file is no help.
+        driver: its driver.
+        tcp: its extra endpoint.
+        loaded: the file, None when it cannot be used.
+        problems: why not, a line each.
+    """
+
+    path: Path
+    loop: LoopConfig
+    driver: str
+    tcp: str | None
+    loaded: LoadedConfig | None = None
+    problems: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, path: Path) -> Wanted:
+        """Read a file; one that cannot be used still says what it can."""
+        try:
+            loaded = load(path)
+        except ConfigError as error:
+            return cls(path, *_salvaged(path), problems=error.problems)
+        config = loaded.config
+        return cls(path, config.loop, config.device.driver, config.telemetry.tcp, loaded)
+
+
+def usable(wanted: Wanted) -> list[Finding]:
+    """What `hapticd check` says of it."""
+    if wanted.loaded is None and not wanted.path.exists():
+        return [problem(line, f"cp {directory('config') / 'hapticd.toml'} {wanted.path}") for line in wanted.problems]
+    if wanted.loaded is None:
+        # The first line that is mended may mend the next.
+        return [problem(line, f"${{EDITOR:-vi}} {wanted.path}") for line in wanted.problems]
+    law = wanted.loaded.config.controller.law
+    rate_hz = wanted.loop.rate_hz
+    return [ok(f"{wanted.path}: ok, {wanted.loaded.hash}, {wanted.driver} with {law} at {rate_hz:g} Hz")]
+
+
+def _salvaged(path: Path) -> tuple[LoopConfig, str, str | None]:
+    """Loop, driver and endpoint of a file that cannot be used as a whole; defaults where it is no help."""
+    loop, device, telemetry = LoopConfig(), DeviceConfig(), TelemetryConfig()
+    tables = {}
+    with contextlib.suppress(OSError, ValueError):
+        tables = {name: table for name, table in tomllib.loads(path.read_text()).items() if isinstance(table, dict)}
+    with contextlib.suppress(ValidationError):
+        loop = LoopConfig.model_validate(tables.get("loop", {}))
+    with contextlib.suppress(ValidationError):
+        device = DeviceConfig.model_validate({"driver": tables.get("device", {}).get("driver", device.driver)})
+    with contextlib.suppress(ValidationError):
+        telemetry = TelemetryConfig.model_validate(tables.get("telemetry", {}))
+    return loop, device.driver, telemetry.tcp

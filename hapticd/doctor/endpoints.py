@@ -1,0 +1,151 @@
+"""Where the daemon meets others: its directory, the other instance that may run, its sockets, its disk."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import shutil
+import socket
+from collections.abc import Mapping
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from hapticd.doctor.finding import Finding, advice, ok, problem
+from hapticd.doctor.tree import ROOT, read, read_if_there
+from hapticd.telemetry.endpoint import CONTROL, TELEMETRY
+
+_LONGEST_SOCKET = 107
+_ENOUGH = 500 * 2**20
+_TOO_LITTLE = 20 * 2**20
+
+
+def running(directory: Path, root: Path = ROOT) -> int:
+    """Process that runs the instance, 0 when none does; asks the kernel and takes no lock itself.
+
+    Args:
+        directory: the instance's runtime directory.
+        root: the file system of /proc.
+
+    Raises:
+        OSError: this user may not look.
+    """
+    lock = directory / "lock"
+    try:
+        inode = lock.stat().st_ino
+    except (FileNotFoundError, NotADirectoryError):
+        return 0
+    held = re.compile(rf"FLOCK\s+ADVISORY\s+WRITE\s+(-?\d+)\s+[0-9a-f]+:[0-9a-f]+:{inode}\s")
+    holder = held.search(read(root / "proc/locks"))
+    if holder is None:
+        return 0
+    said = read_if_there(lock)
+    return int(said) if said.isdecimal() else max(1, int(holder[1]))
+
+
+def instance(name: str, process: int) -> Finding:
+    """Whether the instance runs.
+
+    Args:
+        name: of the instance.
+        process: which runs it, 0 when none does.
+    """
+    return ok(f"{name!r} runs, process {process}" if process else f"{name!r} does not run")
+
+
+def runtime(directory: Path) -> Finding:
+    """Whether the instance's directory can be used, or made.
+
+    Args:
+        directory: where the instance keeps lock and sockets.
+    """
+    longest = max(len(os.fsencode(directory / name)) for name in (TELEMETRY, CONTROL))
+    if longest > _LONGEST_SOCKET:
+        return problem(
+            f"{directory}: too long a path for a socket, {longest} of at most {_LONGEST_SOCKET} characters",
+            f"export HAPTICD_RUNTIME_DIR=/tmp/hapticd-{os.geteuid()}",
+        )
+    place = _nearest(directory)
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        why = "this user may not write there" if place.is_dir() else f"{place} is no directory"
+        return problem(f"{directory}: {why}", f"export HAPTICD_RUNTIME_DIR=/tmp/hapticd-{os.geteuid()}")
+    return ok(str(directory) if place == directory else f"{directory}, made when the daemon starts")
+
+
+def tcp(endpoint: str | None, process: int) -> Finding:
+    """Whether the extra endpoint is free.
+
+    Args:
+        endpoint: of the configuration, such as tcp://127.0.0.1:9872; None when there is none.
+        process: which runs the instance, 0 when none does.
+    """
+    if endpoint is None:
+        return ok("no TCP endpoint is configured")
+    parts = urlsplit(endpoint)
+    host, port = parts.hostname or "", parts.port or 0
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            return _taken(endpoint, port, error, process)
+    return ok(f"{endpoint} is free")
+
+
+def state(directory: Path) -> Finding:
+    """Whether the disk of the state directory has room for fault records.
+
+    Args:
+        directory: where the instance keeps them.
+    """
+    place = _nearest(directory)
+    free = shutil.disk_usage(place).free
+    shown = f"{directory}: {free / 2**30:.3g} GiB free"
+    largest = f"sudo du -xh -d 3 {_mount_of(place)} | sort -h | tail  # the largest directories: make room"
+    if free < _TOO_LITTLE:
+        return problem(f"{directory}: {free / 2**20:.3g} MiB free, no fault could be recorded", largest)
+    return advice(shown, largest) if free < _ENOUGH else ok(shown)
+
+
+def state_directory(name: str, environment: Mapping[str, str], home: Path) -> Path:
+    """Where an instance keeps what outlives it.
+
+    Args:
+        name: of the instance.
+        environment: systemd's or the user's.
+        home: of the user.
+    """
+    given = environment.get("STATE_DIRECTORY", "").split(":")[0]
+    if given:
+        return Path(given)
+    if os.geteuid() == 0:
+        return Path("/var/lib/hapticd") / name
+    return Path(environment.get("XDG_STATE_HOME") or home / ".local/state") / "hapticd" / name
+
+
+def _taken(endpoint: str, port: int, error: OSError, process: int) -> Finding:
+    if error.errno == errno.EADDRINUSE and process:
+        return ok(f"{endpoint} is in use, by the running daemon as it seems")
+    if error.errno == errno.EADDRINUSE:
+        return problem(
+            f"{endpoint} is taken by another program",
+            f"sudo ss -ltnp 'sport = :{port}'  # which one; or choose another telemetry.tcp",
+        )
+    if error.errno == errno.EACCES:
+        return problem(f"{endpoint}: {error.strerror}", "# in the configuration, [telemetry]: a port of 1024 or more")
+    return problem(f"{endpoint}: {error.strerror}", "ip address show lo  # it must have this address")
+
+
+def _nearest(directory: Path) -> Path:
+    """The directory, or what is there of the path to it."""
+    place = directory
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    return place
+
+
+def _mount_of(place: Path) -> Path:
+    while not place.is_mount() and place != place.parent:
+        place = place.parent
+    return place

@@ -1,0 +1,111 @@
+"""The whole examination: every check, in the order in which they are read."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hapticd.doctor import configuration, endpoints, kernel, library, memory, processor, rules, scheduling, usb
+from hapticd.doctor.attempt import attempt
+from hapticd.doctor.configuration import Wanted
+from hapticd.doctor.finding import Check, Finding, Mark, examine, ok
+from hapticd.doctor.latency import Latency, judge, measure
+from hapticd.doctor.tree import ROOT
+from hapticd.telemetry.endpoint import runtime_directory
+
+SCHEMA = 1
+"""Version of what `--json` prints."""
+
+
+@dataclass
+class Examination:
+    """One examination of this computer.
+
+    Args:
+        wanted: what the daemon would be asked for.
+        instance: name of the daemon.
+        root: the file system, for /proc and /sys.
+        environment: where the user says where things are.
+
+    Attributes:
+        latency: what was measured, None while nothing was.
+    """
+
+    wanted: Wanted
+    instance: str
+    root: Path = ROOT
+    environment: Mapping[str, str] = field(default_factory=lambda: dict(os.environ))
+    latency: Latency | None = None
+
+    def checks(self) -> list[Check]:
+        """Every check except the measurement."""
+        root, loop, driver = self.root, self.wanted.loop, self.wanted.driver
+        home = Path(self.environment.get("HOME", "/"))
+        directory = runtime_directory(self.instance)
+        tried = functools.cache(lambda: attempt(loop.priority))
+        daemon = functools.cache(lambda: endpoints.running(directory, root))
+        state = endpoints.state_directory(self.instance, self.environment, home)
+        return [
+            Check("kernel.preemption", "kernel", lambda: kernel.preemption(root)),
+            Check("kernel.timers", "timers", lambda: kernel.timers(root)),
+            Check("processor.architecture", "processor", processor.architecture),
+            Check("processor.count", "processors", lambda: processor.count(loop, root)),
+            Check("processor.governor", "governor", lambda: processor.governor(root)),
+            Check("processor.idle", "deep sleep", lambda: processor.idle(root)),
+            Check("processor.virtual", "machine", lambda: processor.virtual(root)),
+            Check("scheduling.priority", "scheduling", lambda: scheduling.priority(loop, tried().scheduling, root)),
+            Check("scheduling.throttling", "throttling", lambda: scheduling.throttling(root)),
+            Check("scheduling.quota", "quota", lambda: scheduling.quota(root, _or_none(daemon))),
+            Check("memory.locking", "memory", lambda: memory.locking(loop, tried().memory, root)),
+            Check("memory.swap", "swap", lambda: memory.swap(tried().memory, root)),
+            Check("usb.devices", "devices", lambda: usb.devices(driver, root)),
+            Check("usb.kernel_drivers", "bound driver", lambda: usb.kernel_drivers(driver, root)),
+            Check("usb.controller", "controller", lambda: usb.controller(driver, root)),
+            Check("usb.library", "libusb", lambda: usb.library(driver, root)),
+            Check("library.vendor", "SDK", lambda: library.vendor(driver, self.environment, home, root)),
+            Check("rules.installed", "udev rule", lambda: rules.installed(driver, root)),
+            Check("configuration.usable", "config", lambda: configuration.usable(self.wanted)),
+            Check("endpoints.instance", "instance", lambda: endpoints.instance(self.instance, daemon())),
+            Check("endpoints.runtime", "directory", lambda: endpoints.runtime(directory)),
+            Check("endpoints.tcp", "endpoint", lambda: endpoints.tcp(self.wanted.tcp, _or_none(daemon))),
+            Check("endpoints.state", "disk", lambda: endpoints.state(state)),
+        ]
+
+    def findings(self) -> Iterator[Finding]:
+        """What every check but the measurement has found, one after the other."""
+        for check in self.checks():
+            yield from examine(check)
+
+    def measured(self, seconds: float, progress: Callable[[float], None]) -> list[Finding]:
+        """Measure how late a loop wakes.
+
+        Args:
+            seconds: how long [s].
+            progress: told the share that is done.
+        """
+
+        def look() -> Finding:
+            process = endpoints.running(runtime_directory(self.instance), self.root)
+            if process:
+                return ok("not measured beside the running daemon, which it would delay: see hapticd watch")
+            self.latency = measure(self.wanted.loop, seconds, progress, self.root)
+            return judge(self.latency)
+
+        return examine(Check("latency.loop", "latency", look))
+
+
+def verdict(findings: list[Finding]) -> Mark:
+    """The worst of what is known."""
+    marks = {finding.mark for finding in findings}
+    return "problem" if "problem" in marks else "advice" if "advice" in marks else "ok"
+
+
+def _or_none(daemon: Callable[[], int]) -> int:
+    """Process of the daemon; 0 also when this user may not look, which is a finding of its own."""
+    try:
+        return daemon()
+    except OSError:
+        return 0

@@ -1,0 +1,173 @@
+"""How late a loop wakes on this computer, and whether that is good enough at the configured rate.
+
+Lateness is delay, and delay takes stiffness: a wall of K at period T is passive on a device with damping b while
+b > K (T/2 + delay) (Colgate), so a loop that is often T/10 late has to do with a sixth less stiffness, at T/2 with half.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from hapticd.bench import Quantiles, Watch
+from hapticd.config.models import LoopConfig
+from hapticd.contracts.errors import HapticdError
+from hapticd.doctor.finding import Finding, advice, ok, own_command, problem
+from hapticd.doctor.processor import is_virtual
+from hapticd.doctor.tree import ROOT
+from hapticd.telemetry.status import LateHistogram
+
+GOOD_LATE = 0.1
+"""Share of the period that p99 of lateness may take in a good loop."""
+BAD_LATE = 0.5
+"""And from which on it is none."""
+GOOD_SKIPPED = 0.001
+"""Share of deadlines that a good loop may skip."""
+BAD_SKIPPED = 0.01
+
+_ENOUGH_TICKS = 1000
+_BUSY = 0.5
+_STOLEN = 0.01
+_POLL_S = 0.1
+_START_S = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Latency:
+    """What was measured.
+
+    Attributes:
+        rate_hz: of the deadlines [Hz].
+        seconds: how long [s].
+        realtime: scheduling and memory were as the loop wants them.
+        late_us: lateness of the ticks that ran [us].
+        skipped: deadlines that were missed by a whole period.
+        histogram: ticks in the bins of `hapticd/status`.
+        virtual: the processors are those of a virtual machine.
+        stolen: processors that its host gave to somebody else meanwhile.
+        others: processors that other programs kept busy meanwhile.
+        rivals: other programs under real-time scheduling.
+    """
+
+    rate_hz: float
+    seconds: float
+    realtime: bool
+    late_us: Quantiles
+    skipped: int
+    histogram: tuple[int, ...]
+    virtual: bool
+    stolen: float
+    others: float
+    rivals: tuple[str, ...]
+
+    @property
+    def skipped_share(self) -> float:
+        """Share of all deadlines."""
+        return self.skipped / max(1, self.skipped + self.late_us.count)
+
+
+def measure(
+    loop: LoopConfig, seconds: float, progress: Callable[[float], None] = lambda share: None, root: Path = ROOT
+) -> Latency:
+    """Let a child sleep to deadlines, with the rights and on the processor that the daemon would have.
+
+    Args:
+        loop: rate, priority and processor.
+        seconds: how long [s].
+        progress: told the share that is done.
+        root: the file system of /proc.
+
+    Raises:
+        HapticdError: the child did not run.
+    """
+    machine = Watch()
+    command = [sys.executable, "-m", "hapticd.doctor.sleeper", str(os.getpid()), loop.model_dump_json(), str(seconds)]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    started_s = time.monotonic()
+    try:
+        while True:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                output, errors = child.communicate(timeout=_POLL_S)
+                break
+            taken_s = time.monotonic() - started_s
+            progress(min(1.0, taken_s / seconds))
+            if taken_s > seconds + _START_S:
+                raise HapticdError("the child that measures did not end")
+    finally:
+        child.kill()
+        child.wait()
+    if child.returncode:
+        raise HapticdError(f"the child that measures failed: {errors.strip().splitlines()[-1:] or child.returncode}")
+    told = json.loads(output)
+    conditions = machine.end()
+    late_us = [late_ns * 1e-3 for late_ns in told["late_ns"]]
+    histogram = LateHistogram()
+    for late in late_us:
+        histogram.add(late)
+    virtual = False
+    with contextlib.suppress(OSError):
+        virtual = is_virtual(root)
+    return Latency(
+        rate_hz=loop.rate_hz,
+        seconds=seconds,
+        realtime=told["realtime"],
+        late_us=Quantiles.of(late_us),
+        skipped=told["skipped"],
+        histogram=tuple(histogram.counts),
+        virtual=virtual,
+        stolen=conditions.stolen,
+        others=conditions.others,
+        rivals=conditions.rivals,
+    )
+
+
+def judge(latency: Latency) -> Finding:
+    """Whether a loop at this rate runs well here, and whom to ask when it does not."""
+    period_us = 1e6 / latency.rate_hz
+    share = latency.late_us.p99 / period_us
+    figures = (
+        f"{latency.rate_hz:g} Hz: p99 {latency.late_us.p99:.0f} us late, {share:.1%} of the period; "
+        f"latest {latency.late_us.max:.0f} us; {latency.skipped} of "
+        f"{latency.skipped + latency.late_us.count} deadlines skipped"
+    )
+    doubts = _doubts(latency)
+    said = "; ".join([figures, *doubts])
+    if share <= GOOD_LATE and latency.skipped_share <= GOOD_SKIPPED:
+        return ok(said)
+    worse = problem if share > BAD_LATE or latency.skipped_share > BAD_SKIPPED else advice
+    return worse(said, *_remedies(latency))
+
+
+def _doubts(latency: Latency) -> list[str]:
+    """What the figures do not say."""
+    doubts = []
+    if not latency.realtime:
+        doubts.append("measured without real-time rights")
+    if latency.virtual:
+        stolen = f" (it took {latency.stolen:.1%} of a processor)" if latency.stolen > _STOLEN else ""
+        doubts.append(f"a virtual machine: its host{stolen} has a part in this, and the next minute may differ")
+    if latency.others > _BUSY:
+        doubts.append(f"other programs kept {latency.others:.1f} processors busy")
+    if latency.rivals:
+        doubts.append(f"beside another real-time program: {latency.rivals[0]}")
+    if latency.late_us.count + latency.skipped < _ENOUGH_TICKS:
+        doubts.append("too short to trust p99")
+    return doubts
+
+
+def _remedies(latency: Latency) -> list[str]:
+    """What to do about a late loop."""
+    if not latency.realtime:
+        return ["# mend scheduling and memory first, see above"]
+    if latency.others > _BUSY or latency.rivals:
+        return [own_command("doctor") + "  # once more, with the other programs stopped"]
+    if latency.virtual:
+        return ["# measure on the computer that has the device, not in a virtual machine"]
+    return [own_command("bench", "lateness") + "  # tells the loop's own share from the machine's"]
