@@ -15,7 +15,6 @@ from hapticd.contracts.errors import ConfigError
 from hapticd.control.tick import compile_walls
 from hapticd.scene import Wall
 
-
 REPEATABLE = settings(derandomize=True, deadline=None)
 
 

@@ -1,6 +1,6 @@
 """What compiled Python costs against C: the closed loop over a grid, the same arithmetic, results compared.
 
-    python -m hapticd.bench.batch [--points 1000] [--seconds 3] [--repeats 7] [--json]
+    hapticd bench batch [--points 1000] [--seconds 3] [--repeats 7] [--json]
 
 The C is batch_reference.c, built when this runs with `cc -O2 -ffp-contract=off`. All are measured in turns, and the
 best turn of each counts. On one core that is processor time, which other programs hardly disturb; all cores together
@@ -9,17 +9,14 @@ are measured by the clock, so that figure means something only while the machine
 
 from __future__ import annotations
 
-import argparse
 import ctypes
-import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -145,31 +142,6 @@ class Reference:
         return all(np.array_equal(ours[name], theirs[name]) for ours, theirs in pairs for name in ours.dtype.names)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--points", type=int, default=1000)
-    parser.add_argument("--seconds", type=float, default=3.0, help="simulated seconds a point")
-    parser.add_argument("--repeats", type=int, default=7)
-    parser.add_argument("--json", action="store_true")
-    options = parser.parse_args(arguments)
-    figures = measure(options.points, options.seconds, options.repeats)
-    if options.json:
-        print(json.dumps(asdict(figures)))  # noqa: T201 - a command's output
-    else:
-        rows = [
-            ("C -O2, one core", figures.c_one_core, 1.0),
-            ("compiled Python, one core", figures.one_core, figures.one_core_ratio),
-            (f"compiled Python, {figures.threads} threads", figures.all_cores, figures.all_cores_ratio),
-            ("interpreted", figures.interpreted, figures.interpreted_ratio),
-        ]
-        for name, rate, ratio in rows:
-            print(f"{name:32} {rate:9.3f} Mtick/s   {ratio:6.3f} of C")  # noqa: T201
-        print(f"load average {figures.load:.1f} on {figures.threads} processors")  # noqa: T201
-        print(f"same results to the last bit: {figures.equal}")  # noqa: T201
-    return 0 if figures.equal else 1
-
-
 def _struct(name: str, dtype: np.dtype[Any]) -> str:
     assert dtype.names is not None
     fields = " ".join(f"{_C_TYPES[dtype[field].name]} {field};" for field in dtype.names)
@@ -185,7 +157,3 @@ def _seconds(function: Callable[[], Any], clock: Callable[[], float] = time.proc
     start = clock()
     function()
     return clock() - start
-
-
-if __name__ == "__main__":
-    sys.exit(main())

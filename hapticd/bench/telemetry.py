@@ -8,9 +8,7 @@ what they miss. The reference beside it, msgpack packing sixteen numbers, says w
 
 from __future__ import annotations
 
-import argparse
 import itertools
-import json
 import math
 import multiprocessing
 import sys
@@ -18,7 +16,7 @@ import tempfile
 import time
 import timeit
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -123,35 +121,6 @@ def measure(subscribers: int, seconds: float = 5.0) -> Cost:
             reader.kill()
     missing = ticks * subscribers - received
     return Cost(subscribers, ticks, call_us, worst_call_us, cpu_us, bytes_sent / ticks, missing, reference_us)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Measure with 0, 1 and 16 subscribers and print a table."""
-    parser = argparse.ArgumentParser(
-        prog="hapticd bench telemetry",
-        description="Measure what publishing costs with 0, 1 and 16 subscribers.",
-        epilog="Example: hapticd bench telemetry --seconds 10",
-    )
-    parser.add_argument("--seconds", type=float, default=5.0, help="per measurement [s]; 5 when not given")
-    parser.add_argument("--quick", action="store_true", help="a quarter of a second each: shows that it works")
-    parser.add_argument("--json", action="store_true", help="print a JSON array")
-    options = parser.parse_args(arguments)
-    if not 0.1 <= options.seconds <= 600.0:
-        parser.error("--seconds must be 0.1 to 600")
-    seconds = 0.25 if options.quick else options.seconds
-    costs = [measure(subscribers, seconds) for subscribers in (0, 1, 16)]
-    if options.json:
-        lines = [json.dumps([{**asdict(cost), "ratio": cost.ratio} for cost in costs])]
-    else:
-        lines = ["subscribers  call us/tick  worst call us  cpu us/tick  x reference  bytes/tick  missing"]
-        lines += [
-            f"{cost.subscribers:11d}  {cost.call_us:12.1f}  {cost.worst_call_us:13.0f}  {cost.cpu_us:11.1f}"
-            f"  {cost.ratio:11.0f}  {cost.bytes_per_tick:10.0f}  {cost.missing:7d}"
-            for cost in costs
-        ]
-        lines.append(f"reference: msgpack packs 16 floats in {costs[0].reference_us:.2f} us")
-    sys.stdout.write("\n".join(lines) + "\n")
-    return 0
 
 
 def _publish(publisher: Publisher, ticks: int) -> tuple[float, float, float, int]:

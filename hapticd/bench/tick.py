@@ -313,16 +313,16 @@ def serve_daemon(connection: Connection, text: str, heavy: bool) -> None:
             kept = KeptRecords(service.control.shared, heavy)
             service.control.reader = kept
             threading.Thread(target=_tell_start, args=(connection, kept.started), daemon=True).start()
-            read_events = service.control.shared.read_events
+            read_events = service.control.events.read
 
-            def watched(seen: int) -> Any:
-                events = read_events(seen)
+            def watched() -> Any:
+                events = read_events()
                 for event in events:
-                    if 200 <= event.code < 300 and not kept.ticks.fault:
+                    if event.is_fault and not kept.ticks.fault:
                         kept.ticks.fault = event.text
                 return events
 
-            vars(service.control.shared)["read_events"] = watched
+            vars(service.control.events)["read"] = watched
             kept.ticks.warnings = tuple(service.control.warnings)
             exit_code = service.run()
             kept.ticks.dropped = kept.dropped

@@ -25,6 +25,7 @@ COMMANDS: Final = {
     "disarm": "Ramp the force of a running daemon to zero.",
     "clear": "Clear the fault that stopped a running daemon.",
     "reload": "Let a running daemon take its edited file over.",
+    "fault": "List, show or export the records of faults.",
     "service": "Install, show or remove the system service.",
     "simulate": "Run a configuration offline on the simulated device.",
     "study": "Put laws to the test offline, over many runs.",

@@ -11,7 +11,9 @@ from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 def arm(
     instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of the daemon."),
 ) -> None:
-    """Let a running daemon apply forces: the device is enabled, and walls come in by a ramp.
+    """Let a running daemon apply forces.
+
+    The device is enabled, and a wall that is already pressed comes in by a ramp.
 
     Example: hapticd arm --instance left
     """

@@ -11,7 +11,9 @@ from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 def clear(
     instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of the daemon."),
 ) -> None:
-    """Clear the fault that stopped a running daemon; the device stays disarmed until armed.
+    """Clear the fault that stopped a running daemon.
+
+    The device stays disarmed until `hapticd arm`.
 
     Example: hapticd clear --instance left
     """

@@ -11,7 +11,9 @@ from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 def disarm(
     instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of the daemon."),
 ) -> None:
-    """Ramp the force of a running daemon to zero; positions go on streaming.
+    """Ramp the force of a running daemon to zero.
+
+    Positions go on streaming.
 
     Example: hapticd disarm --instance left
     """

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,12 +27,12 @@ from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, runtime_directory
 from hapticd.telemetry.status import LATE_EDGES_US
 
 _STYLES: dict[Mark, str] = {"ok": "green", "advice": "yellow", "problem": "bold red", "unknown": "cyan"}
-_COUNTED = {"problem": "problem", "advice": "advice", "unknown": "could not tell", "ok": "ok"}
+_COUNTED = {"problem": "problems", "advice": "advice", "unknown": "could not tell", "ok": "ok"}
 _MARK_WIDTH = 8
 _TITLE_WIDTH = 13
 _INDENT = 4
 _WIDEST = 110
-_PIECE = re.compile(r"""(?:[^\s'"]|'[^']*'|"[^"]*")+""")
+_WORD = re.compile(r"""(?:[^\s'"]|'[^']*'|"[^"]*")+""")
 """A word of a command line, with what is quoted in it."""
 
 
@@ -49,10 +50,10 @@ def doctor(
     no_latency: Annotated[bool, typer.Option("--no-latency", help="Do not measure it.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Say what keeps this computer from running a good loop, and what mends it.
+    """Say what keeps this computer from running a good loop.
 
-    Looks at kernel, rights, processors, memory, devices, files and sockets, and measures how late a loop wakes. Changes
-    nothing. Exits with 1 when there was a problem.
+    Looks at kernel, rights, processors, memory, devices, files and sockets, measures how late a loop wakes, and names
+    the command that mends each finding. Changes nothing. Exits with 1 when there was a problem.
 
     Example: hapticd doctor --config /etc/hapticd/hapticd.toml
     """
@@ -116,12 +117,12 @@ class _Shown:
         counts = {mark: sum(finding.mark == mark for finding in findings) for mark in _COUNTED}
         self._console.print()
         self._console.print(
-            Text(", ".join(f"{counts[mark]} {name}" for mark, name in _COUNTED.items() if counts[mark]))
+            Text(", ".join(f"{name}: {counts[mark]}" for mark, name in _COUNTED.items() if counts[mark]))
         )
 
     def _histogram(self, latency: Latency) -> None:
         edges = [0, *LATE_EDGES_US]
-        names = [f"{low} to {high} us" for low, high in zip(edges, edges[1:], strict=False)]
+        names = [f"{low} to {high} us" for low, high in pairwise(edges)]
         names.append(f"over {LATE_EDGES_US[-1]} us")
         seen = [index for index, count in enumerate(latency.histogram) if count]
         largest = max(latency.histogram)
@@ -141,14 +142,20 @@ class _Shown:
 
 
 def folded(command: str, width: int) -> list[str]:
-    """A command in lines that a shell takes as one; a word is never torn."""
-    continued, joint = ("# ", "") if command.startswith("#") else ("    ", " \\")
+    """A command in lines that a shell takes as one; no word is torn, and a remark at its end has lines of its own."""
+    words = _WORD.findall(command)
+    remark = words.index("#") if "#" in words else len(words)
+    lines = _filled(words[:remark], width, "    ", " \\")
+    return lines + [f"# {line}" for line in _filled(words[remark + 1 :], width - 2, "", "")]
+
+
+def _filled(words: list[str], width: int, indent: str, joint: str) -> list[str]:
     lines: list[str] = []
-    for word in _PIECE.findall(command):
+    for word in words:
         if lines and len(lines[-1]) + 1 + len(word) + len(joint) <= width:
             lines[-1] += f" {word}"
         else:
-            lines.append(f"{continued}{word}" if lines else word)
+            lines.append(f"{indent}{word}" if lines else word)
     return [line + joint for line in lines[:-1]] + lines[-1:]
 
 

@@ -190,6 +190,12 @@ class TelemetryConfig(Table):
         return endpoint
 
 
+class FaultsConfig(Table):
+    """[faults]: what is kept of them."""
+
+    keep: int = Field(20, ge=0, le=1000, description="fault records kept, the oldest goes first; 0: none are written")
+
+
 class Config(Table):
     """A whole configuration file."""
 
@@ -200,3 +206,4 @@ class Config(Table):
     controller: ControllerConfig = Field(default_factory=ControllerConfig)
     safety: SafetyConfig = Field(default_factory=SafetyConfig)
     telemetry: TelemetryConfig = Field(default_factory=TelemetryConfig)
+    faults: FaultsConfig = Field(default_factory=FaultsConfig)

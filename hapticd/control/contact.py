@@ -115,10 +115,6 @@ class Contact:
         """Be at a position, at rest and without force."""
         self.x_m = self.wall.outward * (position_m - self.wall.position_m)
         self.in_contact = self.x_m < 0.0
-        self.lose_sight()
-
-    def lose_sight(self) -> None:
-        """Forget what was applied: the position is unknown for a while, and the force is let out elsewhere."""
         self.blending = False
         self.force_n = self.requested_n = 0.0
         self.applied_n = self._applied_contact_n = self._applied_spring_n = 0.0

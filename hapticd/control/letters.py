@@ -97,8 +97,8 @@ class Letters:
         tick.switch(new_scene, new_safety, make_law)
         if not keep_law:
             loop.law_count += 1
-        text = f"configuration {config}: law {law} goes on" if keep_law else f"configuration {config}: law {was} -> {law}"
-        loop.event(EventCode.SWITCHED, text, law_before=was, law=law, config=config)
+        change = f"law {law} goes on" if keep_law else f"law {was} -> {law}"
+        loop.event(EventCode.SWITCHED, f"configuration {config}: {change}", law_before=was, law=law, config=config)
 
     def _import(self, name: str) -> Generator[None, None, None]:
         """Import a law beside the loop; its ticks go on, at worst late by the switch interval."""

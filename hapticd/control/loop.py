@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +11,7 @@ from hapticd.contracts.driver import Driver, DriverState, Sample
 from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.control.letters import Letters
-from hapticd.control.predecessor import Predecessor
+from hapticd.control.predecessor import NOBODY, Predecessor
 from hapticd.control.shared import (
     CONTROL_BEAT,
     DONE,
@@ -65,7 +64,7 @@ class ControlLoop:
         safety: SafetyConfig,
         auto_arm: bool,
         sleep_until: Callable[[int], None],
-        before: Predecessor = Predecessor(),
+        before: Predecessor = NOBODY,
     ) -> None:
         self.driver = driver
         self.tick = tick
@@ -88,7 +87,8 @@ class ControlLoop:
 
     def event(self, code: EventCode, text: str, **fields: float | int | str) -> None:
         """Tell the supervisor that something happened."""
-        self.shared.write_event(Event(code, text, self.seq, self._deadline_ns, fields))
+        at_ns = self._deadline_ns or time.monotonic_ns()  # before the first tick there is no deadline
+        self.shared.write_event(Event(code, text, self.seq, at_ns, fields))
 
     def arm(self) -> bool:
         """Enable the device and let forces through; False while latched.
@@ -303,5 +303,4 @@ class ControlLoop:
 
 def _nonsense(error: Exception) -> DriverError:
     """What a driver raised that is no error of a driver, or what came of a sample that is none."""
-    traceback.print_exc()
     return DeviceProtocolError(f"its driver failed: {type(error).__name__}: {error}")

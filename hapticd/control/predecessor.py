@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hapticd.contracts.driver import DeviceInfo
+
 
 @dataclass(frozen=True, slots=True)
 class Predecessor:
@@ -15,6 +17,7 @@ class Predecessor:
         law: index of the law activation.
         may_arm: forces were let through when it ended; a device that arms by itself may do so again.
         latched: a fault that took the force away has not been cleared.
+        device: `identity` of the device; no other one may take its place. "": any.
     """
 
     seq: int = 0
@@ -22,3 +25,15 @@ class Predecessor:
     law: int = 0
     may_arm: bool = True
     latched: bool = False
+    device: str = ""
+
+
+NOBODY = Predecessor()
+"""What the first control process follows."""
+
+
+def identity(info: DeviceInfo) -> str:
+    """What tells a device from another, and what subscribers were told of it."""
+    extras = [f"{info.buttons} buttons"] if info.buttons else []
+    extras += [name for name in ("gripper", "orientation") if getattr(info, f"has_{name}")]
+    return " ".join([info.model, info.serial, f"({', '.join([''.join(info.axes), *extras])})"]).replace("  ", " ")

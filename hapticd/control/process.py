@@ -15,6 +15,7 @@ import signal
 import socket
 import sys
 import time
+import traceback
 from dataclasses import asdict
 from types import ModuleType
 from typing import Any
@@ -25,11 +26,11 @@ from hapticd import registry
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import MAX_WALLS
 from hapticd.contracts.driver import DeviceInfo, Sample
-from hapticd.contracts.errors import ConfigError, DriverError, HapticdError, PluginError
+from hapticd.contracts.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
 from hapticd.contracts.record import RecordLayout
 from hapticd.control.contact import RunningLaw
 from hapticd.control.loop import ControlLoop
-from hapticd.control.predecessor import Predecessor
+from hapticd.control.predecessor import Predecessor, identity
 from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
 from hapticd.control.shared import SUPERVISOR_BEAT, SharedMemory
 from hapticd.control.tick import ControlTick
@@ -91,8 +92,10 @@ def main() -> int:
         return 1  # the supervisor is gone
     try:
         control.run()
-    except DriverError:
-        return DEVICE_LOST  # the event says why
+    except DriverError as error:  # the event says why
+        if error.__cause__ is not None:
+            traceback.print_exception(error.__cause__)
+        return DEVICE_LOST
     return 0
 
 
@@ -105,6 +108,8 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
     place_device(config, driver)
     info = driver.open()
     try:
+        if before.device not in ("", identity(info)):
+            raise DeviceNotFoundError(f"found {identity(info)} instead of {before.device}: restart hapticd to use it")
         _check_watchdog(config, info)
         layout = RecordLayout(len(info.axes), info.has_orientation, MAX_WALLS)
         shared = SharedMemory(layout, settings.loop.rate_hz)

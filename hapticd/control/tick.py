@@ -386,8 +386,6 @@ class ControlTick:
             self._blind = True
             self._blind_gain = 1.0
             self._blind_from_n = list(force_n)
-            for contact in self._active:
-                contact.lose_sight()
         self._blind_gain -= self.period_s / BLIND_RAMP_S
         if self._blind_gain <= 1e-9:
             self._blind_gain = 0.0
@@ -398,10 +396,11 @@ class ControlTick:
         return force_n
 
     def _see_again(self) -> None:
-        """Positions make sense again: stand there, at rest; the force has long been let out."""
+        """Positions make sense again: stand there, at rest and without force; if armed meanwhile, come in by a ramp."""
         self._blind = False
         for contact in self._active:
             contact.start(self.position_m[contact.wall.axis])
+            self._blend(contact)
 
     def _started(
         self, contacts: Iterable[Contact], make_law: Callable[[], RunningLaw]

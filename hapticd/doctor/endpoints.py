@@ -82,7 +82,7 @@ def tcp(endpoint: str | None, process: int) -> Finding:
     if endpoint is None:
         return ok("no TCP endpoint is configured")
     parts = urlsplit(endpoint)
-    host, port = parts.hostname or "", parts.port or 0
+    host, port = (parts.hostname or "").replace("*", ""), parts.port or 0  # `*` is every address
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

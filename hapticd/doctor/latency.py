@@ -1,7 +1,7 @@
 """How late a loop wakes on this computer, and whether that is good enough at the configured rate.
 
 Lateness is delay, and delay takes stiffness: a wall of K at period T is passive on a device with damping b while
-b > K (T/2 + delay) (Colgate), so a loop that is often T/10 late has to do with a sixth less stiffness, at T/2 with half.
+b > K (T/2 + delay) (Colgate), so a loop that is T/10 late has to do with a sixth less stiffness, one at T/2 with half.
 """
 
 from __future__ import annotations
@@ -104,7 +104,9 @@ def measure(
         child.kill()
         child.wait()
     if child.returncode:
-        raise HapticdError(f"the child that measures failed: {errors.strip().splitlines()[-1:] or child.returncode}")
+        raise HapticdError(
+            f"the child that measures failed: {(errors.strip() or str(child.returncode)).splitlines()[-1]}"
+        )
     told = json.loads(output)
     conditions = machine.end()
     late_us = [late_ns * 1e-3 for late_ns in told["late_ns"]]

@@ -50,9 +50,9 @@ def _judged(driver: str, place: str, version: tuple[int, ...]) -> Finding:
         "# download a newer one from forcedimension.com and unpack it, then in its directory:",
         "sudo cp -a lib/release/lin-*/lib*.so* /usr/local/lib/ && sudo ldconfig",
     )
-    if 1 < len(version) and version < _REQUIRED:
+    if len(version) > 1 and version < _REQUIRED:
         return problem(f"{what}: too old, 3.14 is the oldest that will do", *newer)
-    if 1 < len(version) and version < _RECOMMENDED:
+    if len(version) > 1 and version < _RECOMMENDED:
         return advice(f"{what}: old, 3.16 or newer is better", *newer)
     if place.startswith(_CLOSED_TO_SERVICE):
         return advice(

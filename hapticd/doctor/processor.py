@@ -131,7 +131,8 @@ def steal(root: Path = ROOT) -> float:
         OSError: /proc does not tell.
     """
     ticks = [int(field) for field in read(root / "proc/stat").splitlines()[0].split()[1:9]]
-    return ticks[7] / sum(ticks) if len(ticks) > 7 and sum(ticks) else 0.0
+    total = sum(ticks)
+    return ticks[7] / total if len(ticks) > 7 and total else 0.0
 
 
 def _deepest_state(root: Path) -> tuple[int, str]:

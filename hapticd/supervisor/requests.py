@@ -50,3 +50,13 @@ class Requests:
                 answer(str(error))
             else:
                 self._posted = answer
+
+    def abandon(self, why: str) -> None:
+        """Answer all that wait: the loop is gone."""
+        answers = [answer for _, answer in self._waiting]
+        if self._posted is not None:
+            answers.insert(0, self._posted)
+        self._posted = None
+        self._waiting.clear()
+        for answer in answers:
+            answer(why)

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import signal
 import time
-from typing import Any
+from dataclasses import replace
 
-import hapticd
-from hapticd.config.loading import LoadedConfig, load
+from hapticd.config.loading import LoadedConfig
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import Event, EventCode
-from hapticd.contracts.record import Flag, TickRecord
-from hapticd.control.shared import SKIPPED
+from hapticd.contracts.record import Flag
+from hapticd.control.predecessor import Predecessor, identity
+from hapticd.control.shared import RECORDS
+from hapticd.faults.place import fault_directory
+from hapticd.supervisor.chronicle import Chronicle, log
 from hapticd.supervisor.commands import CommandSocket, Reply
-from hapticd.supervisor.controlled import Control
+from hapticd.supervisor.controlled import END_TIMEOUT_S
 from hapticd.supervisor.instance import InstanceLock
 from hapticd.supervisor.notify import Notifier
+from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.release import release_device
+from hapticd.supervisor.reload import switch_letter, wanted_config
+from hapticd.supervisor.report import Report
 from hapticd.supervisor.requests import Answer, Requests
+from hapticd.supervisor.start import Start
 from hapticd.telemetry.endpoint import CONTROL, TELEMETRY
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.status import LateHistogram, Status
 from hapticd.telemetry.wire import measure_epoch_offset_ns
 
 DRAIN_S = 0.01
@@ -31,11 +35,11 @@ DRAIN_S = 0.01
 
 STATUS_S = 1.0
 STOP_TIMEOUT_S = 3.0
+RECORD_TIMEOUT_S = 3.0
+"""How long the end of the daemon waits for a fault record that is being written [s]."""
 
 KNOWN = ("status", "arm", "disarm", "clear", "reload", "stop")
 """What the control socket understands."""
-
-log = logging.getLogger("hapticd")
 
 
 def _nobody(_verdict: str) -> None:
@@ -61,37 +65,30 @@ class Service:
         self.config = config
         self.instance = instance
         self.notifier = Notifier()
+        offset_ns = measure_epoch_offset_ns()
         with contextlib.ExitStack() as undo:
             self.lock = InstanceLock(instance)
             undo.callback(self.lock.close)
-            self.control = Control(config)
-            undo.callback(self.control.close)
-            undo.callback(self.control.end)
+            self.control = Start(config).wait()
+            undo.callback(self._end_control)
             self.publisher = Publisher(
-                config.config.telemetry,
-                self.lock.directory / TELEMETRY,
-                self.control.info,
-                measure_epoch_offset_ns(),
+                config.config.telemetry, self.lock.directory / TELEMETRY, self.control.info, offset_ns
             )
             undo.callback(self.publisher.close)
             self.commands = CommandSocket(self.lock.directory / CONTROL)
             undo.callback(self.commands.close)
             self._undo = undo.pop_all()
         self.requests = Requests(self.control.shared)
+        self.recovery = Recovery()
+        self.report = Report(instance, offset_ns)
+        self.chronicle = Chronicle(instance, self.publisher, self.report, fault_directory(instance), offset_ns)
         self.exit_code: int | None = None
-        self._late = LateHistogram()
-        self._busy_max_us = 0.0
-        self._ticks = 0
-        self._last: TickRecord | None = None
-        self._events_seen = 0
+        self._device_lost: Event | None = None
         self._dropped_told = 0
         self._status_due_s = 0.0
-        self._rate_from = (time.monotonic(), 0)
-        self._rate_hz = 0.0
         self._fed_s = 0.0
         self._stopping = False
         self._stop_by_s = 0.0
-        self._status = Status()
 
     def run(self) -> int:
         """Serve until told to stop; returns the exit code."""
@@ -99,6 +96,10 @@ class Service:
             return asyncio.run(self._serve())
         finally:
             self._undo.close()
+
+    def _end_control(self) -> None:
+        self.control.end()
+        self.control.close()
 
     async def _serve(self) -> int:
         loop = asyncio.get_running_loop()
@@ -115,54 +116,84 @@ class Service:
             settings.controller.law,
             " and ".join(self.publisher.endpoints) or "nothing",
         )
-        for warning in self.control.warnings:
-            log.warning("%s", warning)
+        if self.control.realtime:
+            for warning in self.control.warnings:
+                log.warning("%s", warning)
+        else:
+            self._tell_now(EventCode.NOT_REALTIME, f"not real-time: {'; '.join(self.control.warnings)}")
         while self.exit_code is None:
             self._turn()
             await asyncio.sleep(DRAIN_S)
+        self.recovery.stop()
+        self.chronicle.close(self.config, self.control, RECORD_TIMEOUT_S)
         return self.exit_code
 
     def _turn(self) -> None:
-        """One round: show that we live, fetch and publish, look after the loop."""
+        """One round: show that we live, fetch and publish, look after the loop or for its device."""
         now_s = time.monotonic()
         self.control.beat()
         self._publish()
         self._obey()
-        self.requests.turn()
-        if self.control.exit_code is not None:
-            self._control_ended()
-        elif self.control.stalled():
-            self._control_lost(f"the control loop stood still for more than {self.control.stall_s:g} s")
-        elif self._stopping and now_s > self._stop_by_s:
-            self._control_lost(f"the control loop did not stop within {STOP_TIMEOUT_S:g} s")
-        if now_s >= self._status_due_s and self.exit_code is None:
+        if self.recovery.lost:
+            self._look_for_device()
+        else:
+            self.requests.turn()
+            self._look_after_loop(now_s)
+        self.chronicle.turn(self.config, self.control)
+        if (now_s >= self._status_due_s or self.chronicle.news) and self.exit_code is None:
             self._status_due_s = now_s + STATUS_S
-            self._publish_status(now_s)
+            self.chronicle.news = False
+            self._publish_status()
 
-    def _publish(self) -> None:
-        before = self._last
+    def _publish(self) -> int:
+        """Fetch and publish what the loop has recorded; how many ticks."""
+        before = self.report.last
         records = self.control.reader.read()
-        for record in records:
-            self._late.add(record.late_us)
-            if record.busy_us > self._busy_max_us:
-                self._busy_max_us = record.busy_us
+        self.report.add(records)
         if records:
-            self._ticks += len(records)
             if before is None:
                 self.notifier.send("READY=1")
-            self._last = records[-1]
             self._feed_watchdog()
-            if before is None or before.flags & ~Flag.LIMITED != self._last.flags & ~Flag.LIMITED:
+            if before is None or (before.flags ^ records[-1].flags) & ~Flag.LIMITED:
                 self._status_due_s = 0.0
         self.publisher.publish(records)
         self.publisher.flush(time.monotonic_ns())
-        for event in self.control.shared.read_events(self._events_seen):
-            self._events_seen += 1
-            self._tell(event)
+        for event in self.control.events.read():
+            self.chronicle.tell(event, self.config, self.control)
+            if event.code in (EventCode.DEVICE_LOST, EventCode.DEVICE_FAULT):
+                self._device_lost = event
+                self.control.stall_s = END_TIMEOUT_S
         dropped = self.control.reader.dropped
         if dropped > self._dropped_told:
             lost, self._dropped_told = dropped - self._dropped_told, dropped
+            self.report.add_dropped(lost)
             self._tell_now(EventCode.RING_DROPPED, f"{lost} ticks were overwritten before they were published")
+        return len(records)
+
+    def _look_after_loop(self, now_s: float) -> None:
+        if self.control.exit_code is not None:
+            self._control_ended()
+        elif self.control.stalled():
+            if self._device_lost is not None:  # it hangs while it lets go of a device that is gone
+                self.control.kill()
+            else:
+                self._control_lost(f"the control loop stood still for more than {self.control.stall_s:g} s")
+        elif self._stopping and now_s > self._stop_by_s:
+            self._control_lost(f"the control loop did not stop within {STOP_TIMEOUT_S:g} s")
+
+    def _look_for_device(self) -> None:
+        """Try again when it is time; that nothing ticks meanwhile is no reason for systemd to intervene."""
+        self._feed_watchdog()
+        control = self.recovery.turn(self.config)
+        if control is None:
+            return
+        self.control.close()
+        self.control = control
+        self.requests = Requests(control.shared)
+        self._device_lost = None
+        self._dropped_told = 0
+        away_s = time.monotonic() - self.recovery.lost_s
+        self._tell_now(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)
 
     def _feed_watchdog(self) -> None:
         """Tell systemd that ticks advance, at half the interval that it asks for."""
@@ -171,15 +202,8 @@ class Service:
             self._fed_s = now_s
             self.notifier.send("WATCHDOG=1")
 
-    def _tell(self, event: Event) -> None:
-        level = logging.ERROR if 200 <= event.code < 300 else logging.WARNING if event.code >= 300 else logging.INFO
-        log.log(level, "%s", event.text, extra={"code": event.code, "tick": event.seq})
-        self.publisher.event(event)
-        self._status_due_s = 0.0
-
     def _tell_now(self, code: EventCode, text: str, **fields: float | int | str) -> None:
-        seq = self._last.seq if self._last else 0
-        self._tell(Event(code, text, seq, time.monotonic_ns(), fields))
+        self.chronicle.tell_now(code, text, self.config, self.control, **fields)
 
     def _stop(self, why: str) -> None:
         """Let the loop ramp the force out and end."""
@@ -189,18 +213,38 @@ class Service:
         self._stop_by_s = time.monotonic() + STOP_TIMEOUT_S
         self.notifier.send("STOPPING=1")
         self._tell_now(EventCode.STOPPING, f"{why}: ramping the force out")
-        with contextlib.suppress(ProcessLookupError):
-            self.control.process.send_signal(signal.SIGTERM)
+        if self.recovery.lost:
+            self.exit_code = 0
+        self.control.stop()
 
     def _control_ended(self) -> None:
-        self._publish()
-        if self._stopping and self.control.exit_code == 0:
+        while self._publish():
+            pass
+        self.chronicle.recorder.loop_ended()
+        code = self.control.exit_code
+        if self._stopping and (code == 0 or self._device_lost is not None):
             log.info("stopped")
             self.exit_code = 0
-            return
-        code = self.control.exit_code
-        how = f"was killed by signal {-code}" if code and code < 0 else f"ended with exit code {code}"
-        self._control_lost(f"the control process {how}")
+        elif self._device_lost is not None and self.report.last is not None:
+            self.requests.abandon(self._device_lost.text)
+            self.recovery.begin(self._predecessor(), self._device_lost.text)
+        else:
+            how = f"was killed by signal {-code}" if code and code < 0 else f"ended with exit code {code}"
+            self._control_lost(f"the control process {how}")
+
+    def _predecessor(self) -> Predecessor:
+        """What the control process that lost its device leaves to the next one."""
+        last = self.report.last
+        if last is None or not self.control.shared.words[RECORDS]:
+            return replace(self.recovery.before, latched=self.chronicle.latched)
+        return Predecessor(
+            seq=last.seq + 1,
+            skipped=self.control.skipped,
+            law=last.law,
+            may_arm=bool(last.flags & Flag.ARMED),
+            latched=self.chronicle.latched or bool(last.flags & Flag.LATCHED),
+            device=identity(self.control.info),
+        )
 
     def _control_lost(self, text: str) -> None:
         """The loop no longer looks after the device: take the force away from outside, and end."""
@@ -214,7 +258,9 @@ class Service:
         for request, reply in self.commands.receive():
             match request["do"]:
                 case "status":
-                    reply(True, status=self._status.as_map())
+                    reply(True, status=self.report.status.as_map())
+                case "arm" | "disarm" | "clear" as do if self.recovery.lost:
+                    self._obey_without_device(do, reply)
                 case "arm" | "disarm" | "clear" as do:
                     self.requests.submit({"do": do}, _answering(reply))
                 case "reload" if request.get("wait"):
@@ -228,6 +274,19 @@ class Service:
                 case other:
                     reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
 
+    def _obey_without_device(self, do: str, reply: Reply) -> None:
+        match do:
+            case "arm":
+                reply(False, f"there is no device to arm: {self.recovery.why}")
+            case "disarm":
+                self.recovery.amend(replace(self.recovery.before, may_arm=False))
+                self._tell_now(EventCode.DISARMED, "the device stays disarmed when it is back")
+                reply(True)
+            case _:
+                self.recovery.amend(replace(self.recovery.before, latched=False))
+                self._tell_now(EventCode.CLEARED, "fault cleared")
+                reply(True)
+
     def reload(self, answer: Answer) -> None:
         """Read the configuration file again and hand law, scene and limits to the loop; a bad file changes nothing.
 
@@ -236,8 +295,7 @@ class Service:
         """
         self.notifier.send("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
         try:
-            wanted = load(self.config.path)
-            self._check_reloadable(wanted)
+            wanted = wanted_config(self.config)
         except HapticdError as error:
             self._refuse(str(error), answer)
             return
@@ -252,81 +310,22 @@ class Service:
             self._status_due_s = 0.0
             answer("")
 
-        self.requests.submit(self._switch_letter(wanted), finish)
+        if self.recovery.lost:
+            before = self.recovery.before
+            other_law = wanted.config.controller != self.config.config.controller
+            self.recovery.amend(replace(before, law=before.law + other_law))
+            self._tell_now(EventCode.SWITCHED, f"configuration {wanted.hash}: in force when the device is back")
+            finish("")
+        else:
+            self.requests.submit(switch_letter(self.config, wanted), finish)
 
     def _refuse(self, why: str, answer: Answer) -> None:
         self._tell_now(EventCode.REFUSED, f"configuration refused, nothing changed: {why}")
         self.notifier.send("READY=1")
         answer(why)
 
-    def _check_reloadable(self, wanted: LoadedConfig) -> None:
-        """Refuse what only a restart can change.
-
-        Raises:
-            HapticdError: names the tables.
-        """
-        old, new = self.config.config, wanted.config
-        fixed = [name for name in ("loop", "device", "velocity") if getattr(old, name) != getattr(new, name)]
-        endpoints = [(table.ipc, table.tcp, table.send_high_water) for table in (old.telemetry, new.telemetry)]
-        if endpoints[0] != endpoints[1]:
-            fixed.append("telemetry endpoints")
-        if fixed:
-            raise HapticdError(f"{wanted.path}: [{'], ['.join(fixed)}] changed: that needs a restart")
-
-    def _switch_letter(self, wanted: LoadedConfig) -> dict[str, Any]:
-        settings = wanted.config
-        return {
-            "do": "switch",
-            "law": settings.controller.law,
-            "params": wanted.params.model_dump(),
-            "scene": settings.scene.model_dump(),
-            "safety": settings.safety.model_dump(),
-            "keep_law": settings.controller == self.config.config.controller,
-            "was": self.config.config.controller.law,
-            "config": wanted.hash,
-        }
-
-    def _publish_status(self, now_s: float) -> None:
-        since_s, since_ticks = self._rate_from
-        if now_s - since_s >= 0.5:
-            self._rate_hz = (self._ticks - since_ticks) / (now_s - since_s)
-            self._rate_from = (now_s, self._ticks)
-        settings = self.config.config
-        info = self.control.info
-        last = self._last
-        flags = last.flags if last else 0
-        limit_n = settings.safety.max_force_n or info.max_force_n
-        lifted = settings.safety.profile == "simulation" or limit_n == float("inf")
-        self._status = status = Status(
-            version=hapticd.__version__,
-            instance=self.instance,
-            rate_hz=settings.loop.rate_hz,
-            measured_rate_hz=self._rate_hz,
-            ticks=self._ticks,
-            overruns=self.control.shared.words[SKIPPED],
-            late_histogram=tuple(self._late.counts),
-            late_max_us=self._late.max_us,
-            busy_max_us=self._busy_max_us,
-            ring_drops=self.control.reader.dropped,
-            armed=bool(flags & Flag.ARMED),
-            fallback=bool(flags & Flag.FALLBACK),
-            releasing=bool(flags & Flag.RELEASING),
-            latched=bool(flags & Flag.LATCHED),
-            law=settings.controller.law,
-            law_index=last.law if last else 0,
-            driver=settings.device.driver,
-            device=info.model,
-            serial=info.serial,
-            simulated=info.simulated,
-            axes=info.axes,
-            max_force_n=0.0 if lifted else limit_n,
-            wall_axis=tuple(wall.axis for wall in settings.scene.walls),
-            wall_position_m=tuple(wall.position_m for wall in settings.scene.walls),
-            wall_stiffness_n_per_m=tuple(wall.stiffness_n_per_m for wall in settings.scene.walls),
-            config_file=str(self.config.path),
-            config_hash=self.config.hash,
-            realtime=self.control.realtime,
-            warnings=tuple(self.control.warnings),
-        )
+    def _publish_status(self) -> None:
+        status = self.report.make(self.config, self.control, self.recovery, self.chronicle.recorder.written)
         self.publisher.status(status.as_map())
-        self.notifier.send(f"STATUS={self._rate_hz:.0f} Hz, law {settings.controller.law}")
+        doing = f"no device: {self.recovery.why}" if self.recovery.lost else f"{self.report.rate_hz:.0f} Hz"
+        self.notifier.send(f"STATUS={doing}, law {status.law}")

@@ -76,6 +76,12 @@ class Status:
         config_hash: of its content.
         realtime: scheduling and memory are as the loop needs them.
         warnings: what stands and should be known, a line each, for example "not real-time: ...".
+        device_lost_timestamp: since when the device is gone and looked for [s since the epoch]; 0 while it is there.
+        next_try_timestamp: when it is looked for again [s since the epoch]; 0 while it is there.
+        fault_code: of the last fault since the daemon started; 0 when there was none.
+        fault_text: what there was to say about it.
+        fault_timestamp: when it happened [s since the epoch]; 0 when there was none.
+        fault_records: fault records written since the daemon started.
     """
 
     topic: ClassVar[Topic] = Topic.STATUS
@@ -113,6 +119,12 @@ class Status:
     config_hash: str = ""
     realtime: bool = False
     warnings: tuple[str, ...] = ()
+    device_lost_timestamp: float = 0.0
+    next_try_timestamp: float = 0.0
+    fault_code: int = 0
+    fault_text: str = ""
+    fault_timestamp: float = 0.0
+    fault_records: int = 0
 
     def as_map(self) -> dict[str, Any]:
         """Keys and values, for `Publisher.status`."""

@@ -298,7 +298,7 @@ def test_a_blend_ends_with_the_contact_and_never_pulls_the_hand_in() -> None:
 
 MOVES = st.floats(-1e-3, 1e-3)
 DEEDS = st.sampled_from(
-    [*TRANSITIONS, "arm", "clear", "nan", "jump", "faster", "nothing", "nothing", "nothing", "nothing", "nothing"]
+    [*TRANSITIONS, "arm", "clear", "nan", "dark", "faster", "nothing", "nothing", "nothing", "nothing", "nothing"]
 )
 
 
@@ -327,7 +327,7 @@ def test_whatever_is_asked_in_whatever_order_the_force_goes_by_ramps(path: list[
             before_m, before_m_per_s = position_m, rig.tick.velocity_m_per_s[0]
             moving = deed == "nothing"
             position_m = min(0.01, max(-0.01, position_m + move_m)) if moving else position_m
-            shown_m = math.nan if deed == "nan" and count < 4 else position_m
+            shown_m = math.nan if deed == "dark" or (deed == "nan" and count < 4) else position_m
             force_n = rig.force(shown_m)
             contacts = [*rig.tick.contacts, *rig.tick.leaving]
             spring = sum(max(contact.wall.stiffness_n_per_m, 6000.0) for contact in contacts) + 6000.0
@@ -484,6 +484,15 @@ def test_arming_a_blind_device_fails_anew_and_never_pushes() -> None:
     assert not rig.tick.arm()
 
 
+def test_a_pressed_device_that_was_armed_while_blind_comes_in_by_a_ramp() -> None:
+    """The arming falls between the last bad sample and the first good one."""
+    rig = pressed()
+    rig.forces(math.nan, 20)
+    rig.tick.guard.clear()
+    assert rig.tick.arm()
+    assert rig.forces(-2e-3, RAMP_TICKS + 1) == pytest.approx([4.0 * n / RAMP_TICKS for n in range(RAMP_TICKS + 1)])
+
+
 def test_arming_while_the_blind_force_is_let_out_does_not_bring_it_back() -> None:
     rig = pressed()
     forces = [4.0, *rig.forces(math.nan, 3)]
@@ -554,6 +563,24 @@ def test_a_clock_that_once_runs_back_is_one_bad_sample_and_no_fault() -> None:
     assert rig.tick.dt_s == PERIOD_S
     assert rig.force(-2e-3, ticks=30) == 4.0
     assert rig.tick.fault == 0
+
+
+def test_after_a_long_gap_velocity_is_what_it_was_over_the_gap_and_laws_reckon_with_one_period() -> None:
+    """A computer that slept for 3 s finds the hand 30 mm further: that was 10 mm/s, and not 30 m/s."""
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True, safety={"max_speed_m_per_s": 1.0})
+    rig.force(0.03, dt_s=3.0)
+    assert rig.tick.velocity_m_per_s == [pytest.approx(0.01)]
+    assert rig.tick.dt_s == PERIOD_S
+    rig.force(0.03)
+    assert rig.tick.velocity_m_per_s == [0.0]
+    assert rig.tick.fault == 0
+
+
+def test_while_the_clock_stands_still_the_last_velocity_stands() -> None:
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True)
+    rig.force(1e-3)
+    rig.force(3e-3, dt_s=0.0)
+    assert rig.tick.velocity_m_per_s == [pytest.approx(1.0)]
 
 
 def test_a_device_that_is_too_fast_is_let_go_by_a_ramp() -> None:

@@ -43,6 +43,7 @@ class Daemon:
         environment = {
             **os.environ,
             "HAPTICD_RUNTIME_DIR": str(self.directory / "run"),
+            "HAPTICD_STATE_DIR": str(self.directory / "state"),
             "NOTIFY_SOCKET": str(self.directory / "notify"),
         }
         environment.pop("WATCHDOG_USEC", None)

@@ -91,7 +91,7 @@ class Machine:
 
     def journal(self) -> str:
         """The last lines of the journal."""
-        command = ("nsenter", "--target", str(self._leader), "--all", "journalctl", "--no-pager", "--lines=60")
+        command = ("nsenter", "--target", str(self._leader), "--all", "journalctl", "--no-pager", "--lines=30")
         return subprocess.run(command, capture_output=True, text=True, check=False).stdout
 
     def path(self, path: str) -> Path:
@@ -147,7 +147,7 @@ class Machine:
 def memory_of(control_pid: int) -> SharedMemory:
     """The shared memory of a control process, which outlives it while we hold it."""
     for link in Path(f"/proc/{control_pid}/fd").iterdir():
-        if "memfd:hapticd" in str(link.readlink()):
+        if str(link.readlink()) == "/memfd:hapticd (deleted)":
             return SharedMemory(RecordLayout(1, False, 8), 1000.0, os.open(link, os.O_RDWR | os.O_CLOEXEC))
     raise AssertionError("the control process has no shared memory")
 

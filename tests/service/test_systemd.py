@@ -70,6 +70,7 @@ class Service:
         self.file = CONFIG if instance == "default" else f"/etc/hapticd/{instance}.toml"
         self.endpoint = f"ipc://{machine.path(f'/run/hapticd/{instance}/telemetry')}"
         self.write(config)
+        self._forget_failures()
         machine.run("systemctl", "start", self.unit)
         self.supervisor, self.control = machine.processes(self.unit)
 
@@ -78,6 +79,10 @@ class Service:
 
     def __exit__(self, *_: object) -> None:
         self.machine.run("systemctl", "stop", self.unit)
+        self._forget_failures()
+
+    def _forget_failures(self) -> None:
+        """Let systemd not count how often tests start the unit."""
         self.machine.run("systemctl", "reset-failed", "hapticd.service", "hapticd@*.service", check=False)
 
     def write(self, config: str) -> None:
@@ -300,6 +305,74 @@ def test_nothing_is_written_outside_its_directories(service: Service) -> None:
     places = ("/run/hapticd/", "/var/lib/hapticd/")
     assert [path for path in found.stdout.split() if not path.startswith(places)] == []
     assert "/run/hapticd/default/telemetry" in found.stdout
+
+
+USB_DEVICE = """\
+P: /devices/usb1/1-1
+N: bus/usb/001/005
+E: DEVTYPE=usb_device
+E: SUBSYSTEM=usb
+A: idVendor={vendor}\\n
+A: idProduct={product}\\n
+"""
+BELOW_IT = """
+P: /devices/usb1/1-1/1-1:1.0
+E: DEVTYPE=usb_interface
+E: SUBSYSTEM=usb
+
+P: /devices/usb1/1-1/1-1:1.0/{subsystem}/{name}
+N: {name}
+E: SUBSYSTEM={subsystem}
+"""
+OWN_RULE = (
+    'SUBSYSTEM=="tty", ATTRS{idVendor}=="16c0", ENV{HAPTICD_UNIT}="hapticd@left.service", SYMLINK+="hapticd/left"\n'
+)
+
+
+@pytest.mark.parametrize(
+    ("vendor", "product", "subsystem", "name", "unit"),
+    [
+        ("1451", "0402", "", "", "hapticd@force-dimension.service"),
+        ("16c0", "0486", "hidraw", "hidraw3", "hapticd@hid-rig.service"),
+        ("16c0", "0483", "tty", "ttyACM0", "hapticd@left.service"),
+        ("0403", "6001", "tty", "ttyUSB0", ""),
+        ("046d", "c077", "hidraw", "hidraw4", ""),
+    ],
+    ids=["force dimension", "teensy", "a rig with a rule of its own", "some serial adapter", "some mouse"],
+)
+def test_udev_gives_a_haptic_device_to_the_group_and_starts_its_instance(
+    machine: Machine, vendor: str, product: str, subsystem: str, name: str, unit: str
+) -> None:
+    machine.path("/etc/udev/rules.d/60-own.rules").write_text(OWN_RULE)
+    device = USB_DEVICE.format(vendor=vendor, product=product)
+    place = "/sys/devices/usb1/1-1"
+    if subsystem:
+        device += BELOW_IT.format(subsystem=subsystem, name=name)
+        place += f"/1-1:1.0/{subsystem}/{name}"
+    machine.path("/run/device.umockdev").write_text(device)
+    done = machine.run("umockdev-run", "--device=/run/device.umockdev", "--", "udevadm", "test", place)
+    said = done.stdout + done.stderr
+    group = machine.run("id", "--group", "hapticd").stdout.strip()
+    ours = [line for line in said.splitlines() if "70-hapticd.rules:" in line]
+    wants = re.findall(r"^SYSTEMD_WANTS=(.*)$", said, re.MULTILINE)
+    tags = re.findall(r"^TAGS=(.*)$", said, re.MULTILINE)
+    if unit:
+        assert any(f"GROUP {group}" in line for line in ours), said
+        assert any("MODE 0660" in line for line in ours)
+        assert wants == [unit]
+        assert {"hapticd", "systemd", "uaccess"} <= set(tags[0].split(":"))
+    else:
+        assert (ours, wants) == ([], [])
+
+
+def test_udev_lets_the_group_hold_the_processor_awake(machine: Machine) -> None:
+    device = "P: /devices/virtual/misc/cpu_dma_latency\nN: cpu_dma_latency\nE: SUBSYSTEM=misc\n"
+    machine.path("/run/device.umockdev").write_text(device)
+    place = "/sys/devices/virtual/misc/cpu_dma_latency"
+    done = machine.run("umockdev-run", "--device=/run/device.umockdev", "--", "udevadm", "test", place)
+    group = machine.run("id", "--group", "hapticd").stdout.strip()
+    rules = re.findall(r"70-hapticd.rules:\d+ (\w+ \d+)", done.stdout + done.stderr)
+    assert rules == [f"GROUP {group}", "MODE 0660"]
 
 
 def test_an_uninstall_leaves_configurations_only(machine: Machine) -> None:

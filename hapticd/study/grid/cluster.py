@@ -50,7 +50,7 @@ def blocks(address: str, job: Job, wanted: Sequence[int]) -> Iterator[tuple[int,
             client.submit(_block, job.work, job.spec, block, job.laws, digest, pure=False): block for block in wanted
         }
         try:
-            for future in _dask.as_completed(list(futures)):
+            for future in _dask.as_completed(list(futures), loop=client.loop):
                 block = futures.pop(future)  # and with it the worker's copy of the rows
                 yield block, future.result()
         except HapticdError:

@@ -58,7 +58,9 @@ class Journal:
         self._write({"block": block, "rows": rows})
 
     def close(self) -> None:
-        """Leave the file for another time; twice is as good as once."""
+        """Leave the file for another time if there is something in it; twice is as good as once."""
+        if not self.done and not self._file.closed:
+            self.path.unlink(missing_ok=True)
         self._file.close()
 
     def remove(self) -> None:
@@ -69,6 +71,7 @@ class Journal:
     def _read(self, fingerprint: str) -> None:
         self._file.seek(0)
         good = 0
+        ours = False
         for number, line in enumerate(self._file):
             try:
                 entry = json.loads(line) if line.endswith(b"\n") else None
@@ -76,14 +79,18 @@ class Journal:
                 entry = None
             if not isinstance(entry, dict):
                 break
-            if number == 0 and entry.get("study") != fingerprint:
+            if number == 0:
+                ours = entry.get("study") == fingerprint
+            elif ours:
+                self.done[entry["block"]] = entry["rows"]
+            else:
                 raise ConfigError(
                     f"{self.path}: unfinished work of another study, other settings or another version; finish that "
                     "one, choose another --output, or give --fresh to forget it"
                 )
-            if number > 0:
-                self.done[entry["block"]] = entry["rows"]
             good += len(line)
+        if not ours:
+            good = 0
         self._file.truncate(good)
         if good == 0:
             self._write({"study": fingerprint})

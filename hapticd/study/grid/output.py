@@ -8,6 +8,7 @@ import io
 import json
 import math
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,20 @@ def require_extra(extra: str, *modules: str) -> None:
     missing = [module for module in modules if importlib.util.find_spec(module) is None]
     if missing:
         raise HapticdError(f"this needs {', '.join(missing)}: pip install 'hapticd[{extra}]'")
+
+
+def require_cluster(address: str | None) -> None:
+    """Check what `--cluster` was given.
+
+    Raises:
+        ConfigError: it is no address.
+        HapticdError: the extra is not installed.
+    """
+    if address is None:
+        return
+    require_extra("cluster", "distributed")
+    if not re.fullmatch(r"[a-z]+://[^/\s]+:\d+", address):
+        raise ConfigError(f"--cluster {address}: must be the address of a dask scheduler, as tcp://127.0.0.1:8786")
 
 
 def require_memory(need_bytes: float, what: str) -> None:

@@ -29,7 +29,7 @@ def native_limit(evidence: Evidence) -> Figure:
     axes.axhline(OSCILLATES_M * 1e3, color=RED, lw=0.9, ls="--")
     axes.text(-0.45, OSCILLATES_M * 1.15e3, "oscillates", color=RED, fontsize=7.5)
     axes.axhline(0.01, color=GREY, lw=0.8, ls=":")
-    axes.text(-0.45, 0.0115, "one count", color=GREY, fontsize=7.5)
+    axes.text(2.5, 0.0108, "one count", color=GREY, fontsize=7.5)
     axes.set_yscale("log")
     axes.set_xticks(range(len(NATIVE_N_PER_M)), [f"{k * 1e-3:g}" for k in NATIVE_N_PER_M])
     axes.set_xlim(-0.5, len(NATIVE_N_PER_M) - 0.5)
@@ -48,9 +48,7 @@ def tdpa_map(evidence: Evidence) -> Figure:
     edges = (_edges(shares.map_drops_m * 1e3), _edges(-shares.map_hands_n))
     for column, (name, asked) in enumerate(shares.maps.items()):
         spans_mm = np.clip(asked.peak_to_peak_m.reshape(shape) * 1e3, 1e-3, 1e2)
-        spans = grid[0, column].pcolormesh(
-            *edges, spans_mm, norm=LogNorm(3e-3, 30.0), cmap="cividis_r", rasterized=True
-        )
+        spans = grid[0, column].pcolormesh(*edges, spans_mm, norm=LogNorm(3e-3, 30.0), cmap="YlGnBu", rasterized=True)
         grid[1, column].pcolormesh(*edges, asked.outcome.reshape(shape), cmap=OUTCOMES, vmin=-0.5, vmax=3.5)
         grid[0, column].set_title(name)
         grid[1, column].set_xlabel("start above the wall [mm]")
@@ -67,7 +65,7 @@ def tdpa_map(evidence: Evidence) -> Figure:
 def damping_at_speed(evidence: Evidence) -> Figure:
     """The damping in force against the speed at which it acts: where TDPA goes wrong."""
     figure, ((axes,),) = sheet(WIDTH_IN, 2.9)
-    drawn = [("fig10", "TDPA as published", RED), ("fig10-bounded", "TDPA, bounded", ORANGE)]
+    drawn = [("fig10", "TDPA as published", RED), ("fig10-bounded", "TDPA, bounded", PURPLE)]
     drawn += [(name, f"energy cycles, {name[-2:]} kN/m", colour) for name, colour in zip(HELD, _COLOURS, strict=True)]
     for name, label, colour in drawn:
         run = evidence.runs[name]
@@ -80,7 +78,12 @@ def damping_at_speed(evidence: Evidence) -> Figure:
     axes.set_xlabel("speed [mm/s]")
     axes.set_ylabel("damping in force\n[N s/m]")
     axes.axhline(500.0, color=GREY, lw=0.8, ls="--")
-    axes.text(1.2e-2, 600.0, "2 m/T: a damper alone is unstable above", color=GREY, fontsize=7.5)
+    axes.text(
+        *(1.2e-2, 600.0, "2 m/T: a damper alone is unstable above"),
+        color=INK,
+        fontsize=7.5,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+    )
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), markerscale=4.0)
     return figure
 

@@ -63,9 +63,9 @@ class Claim:
 
 def judge(evidence: Evidence) -> list[Claim]:
     """Every claim, in the order of the paper."""
-    from hapticd.study.paper import experiments, simulations
+    from hapticd.study.paper import experiments, simulations, window
 
-    judges: list[Callable[[Evidence], list[Claim]]] = [simulations.claims, experiments.claims]
+    judges: list[Callable[[Evidence], list[Claim]]] = [simulations.claims, window.claims, experiments.claims]
     return [claim for judged in judges for claim in judged(evidence)]
 
 

@@ -35,11 +35,12 @@ def command(
     require_extra("study", "numpy", "numba", "matplotlib")
     require_folder(output, FILES)
     require_folder(output / "scenarios", ())
-    from hapticd.study.paper.study import FULL, QUICK, run
+    from hapticd.study.paper import study
 
+    extent = study.QUICK if quick else study.FULL
     repeat = "hapticd study paper" + (" --quick" if quick else "")
     with _progress() as progress:
-        claims = run(output, QUICK if quick else FULL, repeat, progress)
+        claims = study.publish(study.gather(extent, progress), output, extent.dots_per_inch, repeat, progress)
     if as_json:
         import json
 

@@ -61,7 +61,7 @@ def converging(evidence: Evidence) -> Figure:
         grid[2, column].set_xlabel("time [s]")
     for axes in grid[:, 1]:
         axes.axvline(0.2, color=GREY, lw=0.8, ls="--")
-    grid[0, 1].legend(loc="upper right", ncol=2)
+    grid[0, 1].legend(loc="lower right", ncol=2)
     _outer_labels(grid)
     return figure
 
@@ -92,7 +92,7 @@ def without_window(evidence: Evidence) -> Figure:
         for axes in grid[:, column]:
             axes.set_xlabel("time [s]")
     _same_height(grid[0])
-    grid[1, 0].legend(loc="lower left", fontsize=7.0, handletextpad=0.2)
+    figure.legend(*grid[1, 0].get_legend_handles_labels(), loc="outside lower center", ncol=2)
     _outer_labels(grid, keep_x=True)
     return figure
 
@@ -163,17 +163,17 @@ def displayed_stiffness(evidence: Evidence) -> Figure:
         stiffness = run.scenario.stiffness_n_per_m
         shown = (run.t_s <= 0.5) & run.in_contact
         for x_m, colour, label, width in (
-            (run.x_measured_m, ORANGE, "over measured depth", 0.9),
-            (run.x_m, BLUE, "over true depth", 1.2),
+            (run.x_m, BLUE, "over true depth", 1.4),
+            (run.x_measured_m, ORANGE, "over measured depth", 0.7),
         ):
             # Force and depth oscillate about zero at first; the mean over 20 ms is what there is to display.
             axes.plot(run.t_s[shown], _displayed(run, x_m)[shown] * 1e-3, color=colour, lw=width, label=label)
         axes.axhline(stiffness * 1e-3, color=GREY, lw=0.9, ls="--", label="commanded")
         axes.set_title(f"{stiffness * 1e-3:g} kN/m")
         axes.set_xlabel("time [s]")
-    grid[0, 0].set_ylim(0.0, 30.0)
+    grid[0, 0].set_ylim(0.0, 25.0)
     grid[0, 0].set_ylabel("displayed stiffness\n[kN/m]")
-    grid[0, 0].legend(loc="upper right", fontsize=7.0)
+    grid[0, 2].legend(loc="lower right")
     return figure
 
 
@@ -199,16 +199,21 @@ def _energy(axes: Axes, run: Recording, shown: Array, colour: str = BLUE) -> Non
 
 
 def _damping(axes: Axes, run: Recording, shown: Array, colour: str = BLUE) -> None:
-    axes.plot(run.t_s[shown], run.damping_n_s_per_m[shown], color=colour, drawstyle="steps-post")
+    axes.plot(run.t_s[shown], run.damping_n_s_per_m[shown], color=colour, drawstyle="steps-post", lw=_thin(run))
     axes.set_ylabel("damping α\n[N s/m]")
     axes.margins(x=0.0)
 
 
 def _force(axes: Axes, run: Recording, shown: Array) -> None:
-    axes.plot(run.t_s[shown], run.force_n[shown], color=BLUE, lw=0.9)
+    axes.plot(run.t_s[shown], run.force_n[shown], color=BLUE, lw=_thin(run))
     axes.set_ylabel("force [N]")
     axes.axhline(-run.scenario.hand_n, color=GREY, lw=0.8, ls="--")
     axes.margins(x=0.0)
+
+
+def _thin(run: Recording) -> float:
+    """Line width of what changes at every tick."""
+    return 0.5 if run.scenario.law == "tdpa" else 1.1
 
 
 def _same_height(row: Sequence[Axes]) -> None:

@@ -16,6 +16,7 @@ from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd.study.paper.runs import Array, Asked, Runs, law_named
+from hapticd.study.paper.scenarios import PRINTED
 from hapticd.study.verdict import Outcome
 
 _BARE: dict[str, Any] = {"model": "paper-simulation", "hand": {"force": {"profile": "constant", "newton": -5.0}}}
@@ -139,16 +140,18 @@ def single_choices() -> list[Reading]:
         Reading("cap = fixed 20", {"cap": "fixed", "cap_damping_n_s_per_m": 20.0}),
         Reading("cap = fixed 200", {"cap": "fixed", "cap_damping_n_s_per_m": 200.0}),
         Reading("wall_may_pull = false", {"wall_may_pull": False}),
+        Reading("small_leaks = 0", {"small_leaks": 0.0}),
+        *(Reading(f"force_delay = {name}", {"force_delay": name}) for name in ("none", "one-sample")),
         *(Reading(f"velocity over {count} samples", velocity_samples=count, own=False) for count in (2, 5, 20)),
         Reading("one sample of force delay", delay_samples=1, own=False),
     ]
 
 
 def combined_choices() -> list[Reading]:
-    """Energy, sum, rule and cap: the four choices that decide most, in every combination."""
+    """Energy, sum, rule and cap: the four choices that decide most, in every combination, without our additions."""
     caps: dict[str, dict[str, Any]] = {"none": {"cap": "none"}, "200": {"cap": "fixed", "cap_damping_n_s_per_m": 200.0}}
     return [
-        Reading(f"{work}, {total}, {rule}, cap {cap}", {"work": work, "sum": total, "rule": rule, **params})
+        Reading(f"{work}, {total}, {rule}, cap {cap}", {**PRINTED, "work": work, "sum": total, "rule": rule, **params})
         for work in ("spring", "total")
         for total in ("cycle", "start")
         for rule in ("non-decreasing", "non-negative", "signed")

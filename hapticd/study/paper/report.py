@@ -35,6 +35,9 @@ figure { margin: 2.2rem 0; break-inside: avoid; }
 figure img { width: 100%; height: auto; display: block; }
 figcaption { font-size: .9rem; color: var(--soft); margin-top: .5rem; max-width: 52rem; }
 figcaption b { color: var(--ink); display: block; }
+td .small, th .small { font-size: .94em; color: var(--soft); font-weight: 400; }
+.claims td:nth-child(1) { width: 8%; } .claims td:nth-child(2) { width: 31%; } .claims td:nth-child(3) { width: 27%; }
+.claims td:nth-child(4) { width: 10%; }
 .wide { overflow-x: auto; }
 .small { font-size: .9rem; color: var(--soft); }
 @media print {
@@ -42,6 +45,8 @@ figcaption b { color: var(--ink); display: block; }
   body { font-size: 10pt; max-width: none; padding: 0; }
   h2 { break-after: avoid; margin-top: 1.6rem; }
   tr, figure { break-inside: avoid; } thead { display: table-header-group; }
+  figure { margin: 5mm 0 7mm; } figure img { width: auto; max-width: 100%; max-height: 104mm; margin: 0 auto; }
+  #readings img { max-height: 215mm; } figcaption { font-size: 8.6pt; max-width: none; }
   table { font-size: 7.6pt; } .wide { overflow: visible; } .runs { font-size: 6.6pt; }
   .runs th, .runs td { padding: .25rem .3rem; } code { background: none; padding: 0; }
 }
@@ -103,7 +108,7 @@ def _claims(claims: Sequence[Claim]) -> str:
         for claim in claims
     ]
     head = "<tr><th>Paper</th><th>Claim, and what was run</th><th>Measured</th><th>Verdict</th><th>Remark</th></tr>"
-    return f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
+    return f'<div class="wide"><table class="claims"><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
 
 
 def _figure(plate: Plate, picture: bytes) -> str:

@@ -12,8 +12,11 @@ from hapticd.config.loading import LoadedConfig, parse
 TDPA_AS_PUBLISHED: dict[str, Any] = {"damping_cap_n_s_per_m": 0.0, "min_speed_m_per_s": 0.0, "reset": "never"}
 """Time-domain passivity control without any bound."""
 
-LITERAL: dict[str, Any] = {"work": "total", "cap": "none"}
-"""Energy cycles with the energy that the paper plots, E_tot of the whole wall force, and no bound on the damping."""
+PRINTED: dict[str, Any] = {"force_delay": "none", "small_leaks": 0.0}
+"""Energy cycles without what the print does not have: no delay is identified, small cycles are cycles."""
+
+LITERAL: dict[str, Any] = {**PRINTED, "work": "total", "cap": "none"}
+"""The same with the energy that the paper plots, E_tot of the whole wall force, and no bound on the damping."""
 
 NO_WINDOW: dict[str, Any] = {"window": 1}
 """Every change of sign of the power ends a cycle."""

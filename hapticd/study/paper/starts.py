@@ -15,7 +15,7 @@ from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd.study.paper.runs import Array, Asked, Runs, law_named
-from hapticd.study.paper.scenarios import LITERAL, NO_WINDOW, TDPA_AS_PUBLISHED
+from hapticd.study.paper.scenarios import LITERAL, NO_WINDOW, PRINTED, TDPA_AS_PUBLISHED
 
 DURATION_S = 6.0
 DROP_M = 0.01
@@ -25,6 +25,11 @@ HANDS_N = (-1.0, -3.0, -6.0)
 NATIVE_N_PER_M = (6e3, 7e3, 8e3, 9e3, 10e3, 12e3)
 HELD_N_PER_M = (12e3, 18e3, 20e3)
 NOISES_M = (0.0, 2e-6)
+WINDOW_READINGS: dict[str, dict[str, Any]] = {"literal": LITERAL, "spring": {**PRINTED, "cap": "none"}, "shipped": {}}
+WINDOW_DEVICES: dict[str, dict[str, Any]] = {
+    "omega.7 model": {},
+    "lightly damped": {"viscous_n_s_per_m": 2.1, "max_force_n": 0.0},
+}
 OSCILLATES_M = 2e-4
 """A span that nobody would call residual quantisation [m]."""
 
@@ -75,7 +80,7 @@ class Shares:
         native: no law, [stiffness, hand, start].
         held: energy cycles, [stiffness, hand, start].
         tdpa, tdpa_bounded: at 12, 18, 20 kN/m under 3 N, [stiffness, start].
-        window: energy cycles at 12 kN/m under 5 N, [literal or default, noise, without or with window, start].
+        window: energy cycles at 12 kN/m under 5 N, [device, reading, noise, without or with window, start].
         models: other devices, energy cycles with the same parameters, then no law, [model, start].
         map_hands_n, map_drops_m: axes of the maps at 12 kN/m.
         maps: law to [hand, start].
@@ -100,7 +105,6 @@ def ask(runs: Runs, size: Size) -> Shares:
     hands_n = -np.linspace(0.25, 8.0, size.map_hands)
     map_drops_m = np.linspace(0.0, DROP_M, size.map_starts)
     unbounded = TDPA_AS_PUBLISHED
-    readings: Sequence[dict[str, Any]] = (LITERAL, {})
     windows: Sequence[dict[str, Any]] = (NO_WINDOW, {})
     return Shares(
         drops_m=drops_m,
@@ -115,8 +119,9 @@ def ask(runs: Runs, size: Size) -> Shares:
         window=runs.ask(
             "energy-cycle",
             [
-                press(12e3, -5.0, drop, {**reading, **window}, noise_m=noise)
-                for reading in readings
+                press(12e3, -5.0, drop, {**reading, **window}, noise_m=noise, **device)
+                for device in WINDOW_DEVICES.values()
+                for reading in WINDOW_READINGS.values()
                 for noise in NOISES_M
                 for window in windows
                 for drop in drops_m

@@ -1,4 +1,4 @@
-"""The whole study: runs, claims, figures and report, into one folder."""
+"""The whole study: first all runs, then claims, figures and report, into one folder."""
 
 from __future__ import annotations
 
@@ -66,24 +66,22 @@ def gather(extent: Extent, progress: Progress) -> Evidence:
     return Evidence(recordings, {name: run.figures() for name, run in recordings.items()}, long, shares, table)
 
 
-def run(folder: Path, extent: Extent, command: str, progress: Progress) -> list[Claim]:
-    """Run, judge, draw and write.
+def publish(evidence: Evidence, folder: Path, dots_per_inch: int, command: str, progress: Progress) -> list[Claim]:
+    """Judge, draw and write.
 
     Args:
+        evidence: what was run.
         folder: where to; it and its `scenarios` must exist.
-        extent: how much.
+        dots_per_inch: of the figures.
         command: what repeats it, for the report.
         progress: is told.
     """
-    evidence = gather(extent, progress)
     claims = judge(evidence)
     pictures: dict[str, bytes] = {}
-    with style.look():
+    with style.look(dots_per_inch):
         for plate in PLATES:
             progress(f"drawing {plate.name}", 0.0)
-            figure = plate.draw(evidence)
-            figure.set_dpi(extent.dots_per_inch)
-            pictures[plate.name] = png(figure)
+            pictures[plate.name] = png(plate.draw(evidence))
             write(folder / f"{plate.name}.png", pictures[plate.name])
             progress(f"drawing {plate.name}", 0.2 / len(PLATES))
     made = f"hapticd {__version__}, Python {platform.python_version()}, {len(evidence.shares.drops_m)} starts a share."

@@ -24,7 +24,7 @@ OUTCOMES = ListedColormap(["#dbe9df", style.SAND, "#df8250", "#7c1d1a"])
 WIDTH_IN = 7.2
 """Width of a figure on an A4 page with margins [inch]."""
 
-_MORE: dict[str, Any] = {
+_MORE: Any = {
     "font.size": 8.5,
     "axes.titlesize": 9.0,
     "axes.titlelocation": "left",
@@ -39,9 +39,9 @@ _MORE: dict[str, Any] = {
 
 
 @contextmanager
-def look() -> Iterator[None]:
+def look(dots_per_inch: int) -> Iterator[None]:
     """Draw in this style."""
-    with style.applied(), mpl.rc_context(_MORE):
+    with style.applied(), mpl.rc_context({**_MORE, "savefig.dpi": dots_per_inch}):
         yield
 
 

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from hapticd.contracts.errors import ConfigError
-from hapticd.study.grid.output import require_extra, require_folder, require_memory, write
+from hapticd.study.grid.output import require_cluster, require_extra, require_folder, require_memory, write
 
 _FILES = ("robustness.csv", "robustness.json", "robustness.png")
 _MOST_DEVICES = 10_000_000
@@ -39,8 +39,7 @@ def command(
     Example: hapticd study robustness --seed 7 --output robust    hapticd study robustness --only 7:57 --output robust
     """
     require_extra("study", "numpy", "numba", "matplotlib")
-    if cluster is not None:
-        require_extra("cluster", "distributed")
+    require_cluster(cluster)
     from hapticd.study.laws import parse_laws
     from hapticd.study.robustness.readings import every_reading
 
@@ -92,8 +91,8 @@ def command(
     unlisted = len(found.failures) - len(near[:_LISTED])
     if unlisted:
         console.print(
-            f"{unlisted} more do not settle, {len(found.failures) - len(near)} of them beyond the reach of damping; each with "
-            f"its reason and the command that replays it: {folder / _FILES[1]}, not_settled",
+            f"{unlisted} more do not settle, {len(found.failures) - len(near)} of them beyond the reach of damping; each "
+            f"with its reason and the command that replays it: {folder / _FILES[1]}, not_settled",
             soft_wrap=True,
         )
     console.print(f"{plan.criterion.words()}", soft_wrap=True, markup=False)

@@ -13,7 +13,7 @@ from rich.console import Console
 from hapticd.config.loading import load, parse
 from hapticd.contracts.errors import ConfigError
 from hapticd.share import directory
-from hapticd.study.grid.output import require_extra, require_folder, require_memory, write
+from hapticd.study.grid.output import require_cluster, require_extra, require_folder, require_memory, write
 
 _FILES = ("zwidth.csv", "zwidth.json", "zwidth.png")
 _METHODS = ("grid", "bisect")
@@ -56,8 +56,7 @@ def command(
     Example: hapticd study zwidth --x stiffness=1e3..40e3 --y rate=500..4000 --laws none,energy-cycle --output maps
     """
     require_extra("study", "numpy", "numba", "matplotlib")
-    if cluster is not None:
-        require_extra("cluster", "distributed")
+    require_cluster(cluster)
 
     from hapticd.study.grid.job import kept, run
     from hapticd.study.laws import parse_laws
@@ -65,7 +64,7 @@ def command(
     from hapticd.study.zwidth.plane import QUANTITIES, parse_axis
     from hapticd.study.zwidth.plot import draw
     from hapticd.study.zwidth.report import report
-    from hapticd.study.zwidth.scenario import scenario_of, with_values
+    from hapticd.study.zwidth.scenario import changing, scenario_of, with_values
     from hapticd.study.zwidth.sweep import Plan
 
     columns, rows = _cells(cells)
@@ -84,7 +83,10 @@ def command(
     name = str(loaded.path)
     text = with_values(loaded.text, name, assign or [], {key: one.key for key, one in QUANTITIES.items()})
     loaded = parse(text, name)
-    scenario_of(loaded)
+    changed = changing(scenario_of(loaded))
+    for axis, option in ((across, f"--x {x}"), (upwards, f"--y {y}")):
+        if axis.quantity.key in changed:
+            raise ConfigError(f"{option}: {name} changes {axis.quantity.key} over time; take that out")
     readings = parse_laws(laws, {loaded.config.controller.law: loaded.config.controller.params})
     plan = Plan(
         text, name, readings, across, upwards, method, duration, starts, Criterion(still_m=still, place_share=place)

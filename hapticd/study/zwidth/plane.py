@@ -61,8 +61,8 @@ class Quantity:
             ConfigError: names what was given.
         """
         if not math.isfinite(value) or value > self.high or value < self.low or (self.positive and value == self.low):
-            least = f"more than {self.low:g}" if self.positive else f"{self.low:g}"
-            raise ConfigError(f"{given}: {self.name} must be {least} and at most {self.high:g} {self.unit}".rstrip())
+            least = f"more than {self.low:g} and at most" if self.positive else f"from {self.low:g} to"
+            raise ConfigError(f"{given}: {self.name} must be {least} {self.high:g} {self.unit}")
         if self.whole and value != round(value):
             raise ConfigError(f"{given}: {self.name} must be a whole number")
 

@@ -98,6 +98,13 @@ def scenario_of(loaded: LoadedConfig) -> Scenario:
     )
 
 
+def changing(scenario: Scenario) -> set[str]:
+    """The keys that the press itself changes over time, so that a map over them would mean nothing."""
+    wall = {f"scene.walls[0].{key}" for one in scenario.wall.changes for key in one.model_dump(exclude_none=True)}
+    keys = {key for change in scenario.device.changes for key in change.values()}
+    return wall | {f"device.options.{'hand.' if k.startswith('hand_') else ''}{k.removeprefix('hand_')}" for k in keys}
+
+
 def with_values(text: str, name: str, given: Sequence[str], keys: dict[str, str]) -> str:
     """The text of a configuration with some values replaced.
 

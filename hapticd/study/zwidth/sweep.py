@@ -34,7 +34,7 @@ EDGE_COLUMNS = ("settles_at_low_end", "settles_at_high_end", "edge_low", "edge_h
 """Of each line: whether its ends settle, and the bracket that holds the edge between them; NaN when there is none."""
 
 STARTS_SPREAD_M = 0.01
-_TICKS_PER_BLOCK = 2e7
+_TICKS_PER_BLOCK = 1e7
 _CELL_BYTES = 900.0
 """Of one cell in rows, tables and pictures, measured generously."""
 
@@ -94,7 +94,7 @@ class Plan:
         ticks = self.starts * self.duration_s / min(periods_s)
         if self.method == "bisect":
             ticks *= _halvings(self.x)
-        return block_sizes(self.cells, max(1, min(2000, int(_TICKS_PER_BLOCK / ticks))))
+        return block_sizes(self.cells, max(1, min(1000, int(_TICKS_PER_BLOCK / ticks))))
 
     def _spec(self) -> dict[str, Any]:
         return {

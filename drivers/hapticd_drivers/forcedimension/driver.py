@@ -1,0 +1,275 @@
+"""Driver `omega7`: an omega.7, or any other device of Force Dimension, through the vendor's SDK.
+
+Nothing of this has been tried on hardware; what it has been tried on is a fake library with the same ABI.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import math
+from collections.abc import Callable, Sequence
+
+from hapticd.contracts.driver import DeviceInfo, Driver, DriverState, Sample
+from hapticd.contracts.errors import ConfigError, DeviceFaultError, DriverStateError, PluginError
+from hapticd_drivers.forcedimension import discovery, presence, settings
+from hapticd_drivers.forcedimension.discovery import FoundDevice
+from hapticd_drivers.forcedimension.failures import TIMEOUT, cause_of
+from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ
+from hapticd_drivers.forcedimension.options import ForceDimensionOptions
+from hapticd_drivers.forcedimension.prototypes import (
+    SATURATED,
+    STATUS_ERROR,
+    STATUS_FORCE,
+    STATUS_FORCE_OFF_CAUSE,
+    STATUS_WORDS,
+)
+from hapticd_drivers.forcedimension.sdk import Sdk
+
+SETTLE_S = 0.1
+"""How long after being enabled the device may still say that forces are off: known programs wait as long [s]."""
+
+STOP_ATTEMPTS = 5
+"""How often `dhdStop` is tried before forces are switched off another way."""
+
+
+class ForceDimension(Driver[ForceDimensionOptions]):
+    """Omega.7 and the other Force Dimension devices, through the vendor's SDK.
+
+    Attributes:
+        saturated: forces so far that the motors could not give in full, and that were scaled down.
+        cached: samples so far that the SDK's TimeGuard gave again.
+    """
+
+    Options = ForceDimensionOptions
+
+    def __init__(self, options: ForceDimensionOptions, period_s: float) -> None:
+        super().__init__(options, period_s)
+        self.saturated = 0
+        self.cached = 0
+        self._sdk: Sdk | None = None
+        self._id = -1
+        self._left = False
+        self._sample = Sample(3)
+        self._position = [ctypes.c_double() for _ in range(3)]
+        self._velocity = [ctypes.c_double() for _ in range(3)]
+        self._frame = (ctypes.c_double * 9)()
+        self._gap = ctypes.c_double()
+        self._status = (ctypes.c_int * STATUS_WORDS)()
+        self._has_wrist = False
+        self._button_bits = 0
+        self._until_status = 0
+        self._settling = 0
+        self._forces_seen = False
+        self._get_pose: Callable[[], int] = _nothing
+        self._get_velocity: Callable[[], int] = _nothing
+        self._get_gap: Callable[[], int] | None = None
+        self._get_buttons: Callable[[], int] = _nothing
+        self._get_status: Callable[[], int] = _nothing
+        self._set_force: Callable[..., int] = _nothing
+
+    @classmethod
+    def find(cls, options: ForceDimensionOptions | None = None) -> list[FoundDevice]:
+        """Every device that is there, whether it can be used or not; none is moved, each is opened for a moment.
+
+        Args:
+            options: where the SDK is.
+        """
+        return discovery.find_devices(None if options is None else options.library)
+
+    @classmethod
+    def lacks(cls, options: ForceDimensionOptions | None = None) -> str:
+        """What this driver needs and this computer has not, a line for people; "" when nothing."""
+        try:
+            Sdk(None if options is None else options.library)
+        except PluginError as error:
+            return str(error)
+        return ""
+
+    @staticmethod
+    def present() -> bool:
+        """Whether a device is plugged in: to be asked again and again, where `open` would scan all of USB."""
+        return presence.present()
+
+    def _open(self) -> DeviceInfo:
+        options = self.options
+        self._sdk = sdk = Sdk(options.library)
+        found = discovery.open_device(sdk, options.serial)
+        self._id = device = found.id
+        model = MODELS[found.type]
+        self._left = sdk.dhdIsLeftHanded(device)
+        buttons = 1 if options.gripper_button else model.buttons
+        max_force_n = model.max_force_n if options.max_force_n is None else options.max_force_n
+        if max_force_n > model.max_force_n:
+            raise ConfigError(
+                f"device.options.max_force_n = {max_force_n:g}: a {model.name} takes at most {model.max_force_n:g} N"
+            )
+        if options.gripper_button and not model.gripper:
+            raise ConfigError(f"device.options.gripper_button = true: a {model.name} has no gripper")
+        settings.configure(sdk, device, options)
+        silence_ms = settings.set_watchdog(sdk, device, options.watchdog_ms, self.period_s)
+        self._prepare(sdk, model.wrist, model.gripper, buttons)
+        return DeviceInfo(
+            model=f"{model.name}, left-handed" if self._left else model.name,
+            serial=str(found.serial),
+            axes=("x", "y", "z"),
+            max_force_n=max_force_n,
+            resolution_m=model.resolution_m,
+            workspace_m=model.spans_m,
+            nominal_rate_hz=NOMINAL_RATE_HZ,
+            safe_damping_n_s_per_m=model.safe_damping_n_s_per_m(self.period_s),
+            host_silence_ms=silence_ms,
+            buttons=buttons,
+            has_gripper=model.gripper,
+            has_orientation=model.wrist,
+            has_velocity=True,
+            has_sequence=True,
+        )
+
+    def _calibrate(self) -> None:
+        sdk = self._opened()
+        if sdk.has("drdIsSupported") and not sdk.drdIsSupported(self._id):
+            raise DriverStateError("omega7: this device cannot calibrate itself: put its pole into the pit by hand")
+        try:
+            sdk.call("drdAutoInit", self._id)
+            sdk.call("drdStop", True, self._id)
+        finally:
+            self._disable()  # drdStop(true) leaves forces on, with nothing that regulates them
+        if not sdk.drdIsInitialized(self._id):
+            raise DeviceFaultError("omega7: the device is still not calibrated; switch it off and on and try again")
+
+    def _enable(self) -> None:
+        sdk = self._opened()
+        device = self._id
+        if not sdk.drdIsInitialized(device):
+            raise DriverStateError(
+                "omega7: the device has not been calibrated since it was switched on: clear its workspace, then "
+                "`hapticd calibrate`, which moves the arm"
+            )
+        self._until_status = self.options.status_every_ticks
+        self._settling = math.ceil(SETTLE_S / self.period_s)
+        self._forces_seen = False
+        try:
+            sdk.call("dhdSetMaxForce", self.info.max_force_n, device)
+            sdk.call("dhdSetBrakes", 0, device)
+            sdk.call("dhdEnableForce", 1, device)
+            sdk.call("dhdSetGravityCompensation", int(self.options.gravity_compensation), device)
+            if self.options.gripper_button:
+                sdk.call("dhdEmulateButton", 1, device)
+            sdk.call("dhdSetForceAndTorqueAndGripperForce", *[0.0] * 7, device)
+        except BaseException:
+            self._disable()
+            raise
+
+    def _read(self) -> Sample:
+        result = self._get_pose()
+        if result:
+            if result < 0:
+                raise self._opened().failure("reading the position")
+            self.cached += 1
+        sample = self._sample
+        if not result:
+            sample.sequence += 1
+        position_m = sample.position_m
+        x, y, z = self._position
+        position_m[0] = x.value
+        position_m[1] = y.value
+        position_m[2] = z.value
+        velocity_m_per_s = sample.velocity_m_per_s
+        if self._get_velocity() >= 0:
+            x, y, z = self._velocity
+            velocity_m_per_s[0] = x.value
+            velocity_m_per_s[1] = y.value
+            velocity_m_per_s[2] = z.value
+        else:
+            self._no_velocity()
+        if self._has_wrist:
+            sample.orientation[:] = self._frame
+        if self._get_gap is not None:
+            if self._get_gap() < 0:
+                raise self._opened().failure("dhdGetGripperGap")
+            # CHAI3D turns the sign of a left-handed gripper's angle; of its gap nobody says, and an opening has none.
+            sample.gripper_m = abs(self._gap.value) if self._left else self._gap.value
+        if self._button_bits:
+            sample.buttons = self._get_buttons() & self._button_bits
+        self._until_status -= 1
+        if self._until_status <= 0:
+            self._look_at_status()
+        return sample
+
+    def _write(self, force_n: Sequence[float]) -> None:
+        result = self._set_force(force_n[0], force_n[1], force_n[2], 0.0, 0.0, 0.0, 0.0, self._id)
+        if result:
+            if result < 0:
+                raise self._opened().failure("setting the force")
+            if result == SATURATED:
+                self.saturated += 1
+
+    def _disable(self) -> None:
+        sdk = self._sdk
+        if sdk is None or self._id < 0:
+            return
+        for _ in range(STOP_ATTEMPTS):
+            if sdk.dhdStop(self._id) >= 0:
+                return
+        sdk.dhdEnableForce(0, self._id)
+
+    def _close(self) -> None:
+        if self._sdk is not None and self._id >= 0:
+            discovery.close_device(self._sdk, self._id)
+        self._id = -1
+        self._sdk = None
+
+    def _opened(self) -> Sdk:
+        assert self._sdk is not None
+        return self._sdk
+
+    def _prepare(self, sdk: Sdk, wrist: bool, gripper: bool, buttons: int) -> None:
+        """Every call of a tick with its buffers, made once: the tick allocates nothing but the calls."""
+        device = self._id
+        self._sample = Sample(3)
+        self.saturated = self.cached = 0
+        self._has_wrist = wrist
+        self._button_bits = (1 << buttons) - 1
+        position = [ctypes.byref(number) for number in self._position]
+        velocity = [ctypes.byref(number) for number in self._velocity]
+        if wrist:
+            self._get_pose = functools.partial(sdk.dhdGetPositionAndOrientationFrame, *position, self._frame, device)
+        else:
+            self._get_pose = functools.partial(sdk.dhdGetPosition, *position, device)
+        self._get_velocity = functools.partial(sdk.dhdGetLinearVelocity, *velocity, device)
+        gap = ctypes.byref(self._gap)
+        self._get_gap = functools.partial(sdk.dhdGetGripperGap, gap, device) if gripper else None
+        self._get_buttons = functools.partial(sdk.dhdGetButtonMask, device)
+        self._get_status = functools.partial(sdk.dhdGetStatus, self._status, device)
+        self._set_force = sdk.dhdSetForceAndTorqueAndGripperForce
+
+    def _no_velocity(self) -> None:
+        """The SDK has no velocity until two samples lie in its window; any other reason is an error."""
+        sdk = self._opened()
+        if sdk.last_error() != TIMEOUT:
+            raise sdk.failure("dhdGetLinearVelocity")
+        self._sample.velocity_m_per_s[:] = (0.0, 0.0, 0.0)
+
+    def _look_at_status(self) -> None:
+        """Notice that the device has taken the force away by itself, and say why."""
+        every = self.options.status_every_ticks
+        self._until_status = every
+        if self.state is not DriverState.ENABLED:
+            return
+        if self._get_status() < 0:
+            raise self._opened().failure("dhdGetStatus")
+        status = self._status
+        if status[STATUS_ERROR]:
+            raise DeviceFaultError(f"omega7: the device reports an error of its own ({status[STATUS_ERROR]})")
+        if status[STATUS_FORCE]:
+            self._forces_seen = True
+            return
+        self._settling -= every
+        if self._forces_seen or self._settling <= 0:
+            cause = cause_of(status[STATUS_FORCE_OFF_CAUSE])
+            raise DeviceFaultError(f"omega7: the device took the force away: {cause}")
+
+
+def _nothing(*_: object) -> int:
+    return 0

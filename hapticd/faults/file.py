@@ -1,0 +1,112 @@
+r"""A fault record as a file: what it is, in JSON, then the ticks as they lay in the ring.
+
+hapticd fault record 1\n
+{"event": ..., "config": ..., "device": ..., "ticks": {"count": 6001, "format": "<qqddd...", ...}, ...}\n
+zlib stream of rows
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hapticd.contracts.errors import HapticdError
+from hapticd.contracts.record import RecordLayout, TickRecord
+
+MAGIC = b"hapticd fault record 1\n"
+SUFFIX = ".fault"
+
+_LARGEST_HEADER = 1 << 24
+
+
+@dataclass(frozen=True, slots=True)
+class FaultRecord:
+    """A fault record that was read.
+
+    Attributes:
+        name: what `hapticd fault` calls it.
+        header: event, configuration, device, version, kernel; see docs/faults.md.
+        ticks: the ticks around the fault, oldest first.
+    """
+
+    name: str
+    header: dict[str, Any]
+    ticks: list[TickRecord]
+
+    @property
+    def fault_ns(self) -> int:
+        """When it happened, on CLOCK_MONOTONIC [ns]."""
+        return int(self.header["event"]["deadline_ns"])
+
+
+def encode(header: dict[str, Any], layout: RecordLayout, rows: Iterator[bytes], max_walls: int) -> bytes:
+    """A fault record as bytes.
+
+    Args:
+        header: what the record says of itself.
+        layout: how the rows lie.
+        rows: whole rows, any number in each piece.
+        max_walls: most walls that a row can hold.
+    """
+    compressor = zlib.compressobj(level=1)
+    packed = bytearray()
+    size = 0
+    for piece in rows:
+        size += len(piece)
+        packed += compressor.compress(piece)
+    packed += compressor.flush()
+    ticks = {
+        "count": size // layout.size,
+        "bytes": layout.size,
+        "format": layout.struct(max_walls).format,
+        "axes": layout.axes,
+        "orientation": layout.orientation,
+        "max_walls": max_walls,
+    }
+    said = json.dumps({**header, "ticks": ticks}, allow_nan=False).encode()
+    return MAGIC + said + b"\n" + bytes(packed)
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """What a fault record says of itself.
+
+    Raises:
+        HapticdError: it cannot be read, or is none.
+    """
+    return _parts(path, ticks=False)[0]
+
+
+def read(path: Path) -> FaultRecord:
+    """A fault record with its ticks.
+
+    Raises:
+        HapticdError: it cannot be read, or is none that this version knows.
+    """
+    header, packed = _parts(path, ticks=True)
+    try:
+        ticks = header["ticks"]
+        layout = RecordLayout(ticks["axes"], ticks["orientation"], ticks["max_walls"])
+        if ticks["format"] != layout.struct(ticks["max_walls"]).format:
+            raise HapticdError(f"{path}: its ticks are laid out as hapticd {header['version']} does; read it with that")
+        rows = memoryview(zlib.decompress(packed))
+        found = [layout.unpack(rows[at : at + layout.size]) for at in range(0, len(rows), layout.size)]
+    except (zlib.error, KeyError, TypeError, ValueError, IndexError) as error:
+        raise HapticdError(f"{path}: damaged: {error}") from error
+    return FaultRecord(path.stem, header, found)
+
+
+def _parts(path: Path, ticks: bool) -> tuple[dict[str, Any], bytes]:
+    try:
+        with path.open("rb") as file:
+            if file.readline(len(MAGIC)) != MAGIC:
+                raise HapticdError(f"{path}: no fault record that this version of hapticd can read")
+            header: dict[str, Any] = json.loads(file.readline(_LARGEST_HEADER))
+            return header, file.read() if ticks else b""
+    except OSError as error:
+        raise HapticdError(f"{path}: {error.strerror}") from error
+    except ValueError as error:
+        raise HapticdError(f"{path}: damaged: {error}") from error

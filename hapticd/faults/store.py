@@ -1,0 +1,70 @@
+"""The fault records of an instance: a directory that never holds more than it may."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from pathlib import Path
+
+from hapticd.contracts.errors import HapticdError
+from hapticd.faults.file import SUFFIX
+
+_UNFINISHED = ".part"
+
+
+class FaultStore:
+    """A directory of fault records; their names sort by time.
+
+    Args:
+        directory: where they lie; made when the first is written.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+
+    def paths(self) -> list[Path]:
+        """The records, newest first.
+
+        Raises:
+            HapticdError: this user may not look.
+        """
+        try:
+            return sorted((path for path in self.directory.iterdir() if path.suffix == SUFFIX), reverse=True)
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise HapticdError(f"{self.directory}: {error.strerror}; join the group hapticd, or use sudo") from error
+
+    def write(self, epoch_s: float, code: int, content: bytes, keep: int) -> Path:
+        """Add a record, whole or not at all, and remove the oldest of those that are too many.
+
+        Args:
+            epoch_s: when the fault happened, which names the record [s].
+            code: its event code.
+            content: the record.
+            keep: most records to keep.
+
+        Raises:
+            OSError: it could not be written; the directory is as it was.
+        """
+        self.directory.mkdir(parents=True, exist_ok=True, mode=0o750)
+        milliseconds = int(epoch_s * 1e3)
+        stamp = time.strftime("%Y%m%dT%H%M%S", time.gmtime(milliseconds // 1000))
+        path = self.directory / f"{stamp}.{milliseconds % 1000:03d}Z-{code}{SUFFIX}"
+        unfinished = path.with_suffix(_UNFINISHED)
+        try:
+            with unfinished.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            unfinished.rename(path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                unfinished.unlink()
+            raise
+        for stale in self.directory.glob(f"*{_UNFINISHED}"):  # of a daemon that was killed while it wrote
+            stale.unlink(missing_ok=True)
+        for old in self.paths()[keep:]:
+            old.unlink(missing_ok=True)
+        return path

@@ -1,0 +1,86 @@
+"""A device that was lost is looked for until it is back: soon at first, then less often."""
+
+from __future__ import annotations
+
+import time
+
+from hapticd.config.loading import LoadedConfig
+from hapticd.contracts.errors import HapticdError
+from hapticd.control.predecessor import NOBODY, Predecessor
+from hapticd.supervisor.controlled import Control
+from hapticd.supervisor.start import Start
+
+FIRST_S = 1.0
+LONGEST_S = 30.0
+"""Time to the first try and the longest between two; each wait is twice the one before [s]."""
+
+STEADY_S = 60.0
+"""A device that has been there for so long is looked for as if it were lost for the first time [s]."""
+
+
+class Recovery:
+    """Starts control processes until one has the device again.
+
+    Attributes:
+        lost: the device is being looked for.
+        lost_s: since when, on CLOCK_MONOTONIC [s].
+        next_try_s: when the next try is due; of one under way, when it began [s].
+        why: why the last try failed, or why the device was lost.
+        before: what the next control process goes on from.
+    """
+
+    def __init__(self) -> None:
+        self.lost = False
+        self.lost_s = 0.0
+        self.next_try_s = 0.0
+        self.why = ""
+        self.before = NOBODY
+        self._wait_s = FIRST_S
+        self._found_s = 0.0
+        self._start: Start | None = None
+
+    def begin(self, before: Predecessor, why: str) -> None:
+        """Look for a device that has just been lost."""
+        now_s = time.monotonic()
+        if now_s - self._found_s > STEADY_S:
+            self._wait_s = FIRST_S
+        self.lost = True
+        self.lost_s = now_s
+        self.before = before
+        self._put_off(why)
+
+    def turn(self, config: LoadedConfig) -> Control | None:
+        """Go on looking; returns at once. The control process that has the device, once there is one."""
+        now_s = time.monotonic()
+        try:
+            if self._start is None:
+                if now_s >= self.next_try_s:
+                    self._start = Start(config, self.before)
+                return None
+            control = self._start.poll()
+            if control is None:
+                return None
+        except (HapticdError, OSError) as error:
+            self._start = None
+            self._put_off(str(error))
+            return None
+        self._start = None
+        self.lost = False
+        self._found_s = now_s
+        return control
+
+    def amend(self, before: Predecessor) -> None:
+        """Change what the next control process goes on from, also when it is already on its way."""
+        self.before = before
+        self.stop()
+
+    def stop(self) -> None:
+        """Stop looking."""
+        if self._start is not None:
+            self._start.end()
+            self._start = None
+
+    def _put_off(self, why: str) -> None:
+        self.why = why
+        self.next_try_s = time.monotonic() + self._wait_s
+        self._wait_s = min(2.0 * self._wait_s, LONGEST_S)

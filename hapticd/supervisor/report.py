@@ -1,0 +1,132 @@
+"""What the daemon says of itself: counts kept over its life, and the status that is made of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import hapticd
+from hapticd.contracts.event import Event
+from hapticd.contracts.record import Flag, TickRecord
+from hapticd.telemetry.status import LateHistogram, Status
+from hapticd.telemetry.wire import timestamp_s
+
+if TYPE_CHECKING:
+    from hapticd.config.loading import LoadedConfig
+    from hapticd.supervisor.controlled import Control
+    from hapticd.supervisor.recovery import Recovery
+
+_RATE_S = 0.5
+"""Shortest time that a measured rate is taken over [s]."""
+
+
+class Report:
+    """Counts since the daemon started.
+
+    Args:
+        instance: name of the daemon's instance.
+        epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
+
+    Attributes:
+        last: the newest tick, None before the first.
+        rate_hz: measured lately [Hz].
+        status: as it was made last.
+    """
+
+    def __init__(self, instance: str, epoch_offset_ns: int) -> None:
+        self.last: TickRecord | None = None
+        self.rate_hz = 0.0
+        self.status = Status()
+        self._instance = instance
+        self._offset_ns = epoch_offset_ns
+        self._late = LateHistogram()
+        self._busy_max_us = 0.0
+        self._ticks = 0
+        self._dropped = 0
+        self._rate_from = (time.monotonic(), 0)
+        self._fault: Event | None = None
+
+    def add(self, records: Sequence[TickRecord]) -> None:
+        """Count ticks."""
+        for record in records:
+            self._late.add(record.late_us)
+            if record.busy_us > self._busy_max_us:
+                self._busy_max_us = record.busy_us
+        if records:
+            self._ticks += len(records)
+            self.last = records[-1]
+
+    def add_dropped(self, ticks: int) -> None:
+        """Count ticks that were overwritten before they were fetched."""
+        self._dropped += ticks
+
+    def add_event(self, event: Event) -> None:
+        """Remember the last fault."""
+        if event.is_fault:
+            self._fault = event
+
+    def make(self, config: LoadedConfig, control: Control, recovery: Recovery, fault_records: int) -> Status:
+        """The status as it is now."""
+        self._measure_rate()
+        settings = config.config
+        info = control.info
+        flags = self.last.flags if self.last else 0
+        if recovery.lost:
+            flags = Flag.LATCHED if recovery.before.latched else 0
+        limit_n = settings.safety.max_force_n or info.max_force_n
+        lifted = settings.safety.profile == "simulation" or limit_n == math.inf
+        self.status = Status(
+            version=hapticd.__version__,
+            instance=self._instance,
+            rate_hz=settings.loop.rate_hz,
+            measured_rate_hz=self.rate_hz,
+            ticks=self._ticks,
+            overruns=control.skipped,
+            late_histogram=tuple(self._late.counts),
+            late_max_us=self._late.max_us,
+            busy_max_us=self._busy_max_us,
+            ring_drops=self._dropped,
+            armed=bool(flags & Flag.ARMED),
+            fallback=bool(flags & Flag.FALLBACK),
+            releasing=bool(flags & Flag.RELEASING),
+            latched=bool(flags & Flag.LATCHED),
+            law=settings.controller.law,
+            law_index=self.last.law if self.last else 0,
+            driver=settings.device.driver,
+            device=info.model,
+            serial=info.serial,
+            simulated=info.simulated,
+            axes=info.axes,
+            max_force_n=0.0 if lifted else limit_n,
+            wall_axis=tuple(wall.axis for wall in settings.scene.walls),
+            wall_position_m=tuple(wall.position_m for wall in settings.scene.walls),
+            wall_stiffness_n_per_m=tuple(wall.stiffness_n_per_m for wall in settings.scene.walls),
+            config_file=str(config.path),
+            config_hash=config.hash,
+            realtime=control.realtime,
+            warnings=(*((_missing(recovery),) if recovery.lost else ()), *control.warnings),
+            device_lost_timestamp=self._epoch_s(recovery.lost_s) if recovery.lost else 0.0,
+            next_try_timestamp=self._epoch_s(recovery.next_try_s) if recovery.lost else 0.0,
+            fault_code=self._fault.code if self._fault else 0,
+            fault_text=self._fault.text if self._fault else "",
+            fault_timestamp=timestamp_s(self._fault.deadline_ns, self._offset_ns) if self._fault else 0.0,
+            fault_records=fault_records,
+        )
+        return self.status
+
+    def _measure_rate(self) -> None:
+        now_s = time.monotonic()
+        since_s, since_ticks = self._rate_from
+        if now_s - since_s >= _RATE_S:
+            self.rate_hz = (self._ticks - since_ticks) / (now_s - since_s)
+            self._rate_from = (now_s, self._ticks)
+
+    def _epoch_s(self, monotonic_s: float) -> float:
+        return timestamp_s(round(monotonic_s * 1e9), self._offset_ns)
+
+
+def _missing(recovery: Recovery) -> str:
+    in_s = recovery.next_try_s - time.monotonic()
+    return f"no device ({recovery.why}); {f'next try in {in_s:.0f} s' if in_s > 0.0 else 'trying to find it'}"

@@ -1,0 +1,155 @@
+"""What the doctor says of files, sockets and the daemon that may be using them."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import socket
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from hapticd.doctor import configuration, endpoints
+from hapticd.doctor.configuration import Wanted
+from hapticd.doctor.finding import Check, examine
+from hapticd.share import directory
+from hapticd.supervisor.instance import InstanceLock
+from tests.doctor.machine import says
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path / "run"))
+    return tmp_path / "run" / "default"
+
+
+# -- the instance
+
+
+def test_a_running_daemon_is_seen_without_touching_its_lock(runtime: Path) -> None:
+    assert endpoints.running(runtime) == 0
+    lock = InstanceLock("default")
+    try:
+        assert endpoints.running(runtime) == os.getpid()
+        says(endpoints.instance("default", endpoints.running(runtime)), "ok", f"process {os.getpid()}")
+    finally:
+        lock.close()
+    says(endpoints.instance("default", endpoints.running(runtime)), "ok", "does not run")
+
+
+def test_a_lock_file_that_a_killed_daemon_left_is_no_daemon(runtime: Path) -> None:
+    runtime.mkdir(parents=True)
+    (runtime / "lock").write_text("4711\n")
+    assert endpoints.running(runtime) == 0
+
+
+def test_a_reader_of_the_lock_is_no_daemon(runtime: Path) -> None:
+    runtime.mkdir(parents=True)
+    (runtime / "lock").write_text("4711\n")
+    with (runtime / "lock").open() as reader:
+        fcntl.flock(reader, fcntl.LOCK_SH)
+        assert endpoints.running(runtime) == 0
+
+
+def test_without_the_kernels_list_of_locks_nobody_can_tell(runtime: Path, tmp_path: Path) -> None:
+    runtime.mkdir(parents=True)
+    (runtime / "lock").touch()
+    look = Check("a.check", "check", lambda: endpoints.instance("default", endpoints.running(runtime, tmp_path)))
+    says(examine(look), "unknown", "proc/locks")
+
+
+# -- its directory
+
+
+def test_a_directory_that_can_be_made_is_well(tmp_path: Path) -> None:
+    says(endpoints.runtime(tmp_path / "run/default"), "ok", "made when the daemon starts")
+    says(endpoints.runtime(tmp_path), "ok", str(tmp_path))
+
+
+def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
+    (tmp_path / "run").touch()
+    assert (
+        "HAPTICD_RUNTIME_DIR=" in says(endpoints.runtime(tmp_path / "run/default"), "problem", "no directory").mend[0]
+    )
+
+
+def test_a_directory_of_somebody_else_is_not_usable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.access", lambda *_: False)
+    says(endpoints.runtime(tmp_path), "problem", "may not write")
+
+
+def test_a_path_longer_than_a_socket_address_is_refused_before_zeromq_does(tmp_path: Path) -> None:
+    says(endpoints.runtime(tmp_path / ("x" * 100)), "problem", "107")
+
+
+# -- the extra endpoint
+
+
+def test_an_endpoint_is_free_or_taken() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        endpoint = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+        assert "ss -ltnp" in says(endpoints.tcp(endpoint, 0), "problem", "taken by another").mend[0]
+        says(endpoints.tcp(endpoint, 4711), "ok", "running daemon")
+    says(endpoints.tcp(endpoint, 0), "ok", "is free")
+    says(endpoints.tcp(None, 0), "ok", "no TCP endpoint")
+
+
+def test_an_address_that_no_interface_has_is_named() -> None:
+    says(endpoints.tcp("tcp://192.0.2.1:9872", 0), "problem", "192.0.2.1")
+
+
+# -- the disk
+
+
+@pytest.mark.parametrize(("free_mib", "mark"), [(10_000, "ok"), (100, "advice"), (1, "problem")])
+def test_fault_records_need_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_mib: int, mark: str) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free_mib << 20))
+    says(endpoints.state(tmp_path / "not/yet/there"), mark, "free")
+
+
+def test_the_state_directory_is_systemds_or_the_users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = endpoints.state_directory("left", {"STATE_DIRECTORY": "/var/lib/hapticd/left"}, tmp_path)
+    assert given == Path("/var/lib/hapticd/left")
+    monkeypatch.setattr("os.geteuid", lambda: 1000)
+    assert endpoints.state_directory("left", {}, tmp_path) == tmp_path / ".local/state/hapticd/left"
+    assert endpoints.state_directory("left", {"XDG_STATE_HOME": "/s"}, tmp_path) == Path("/s/hapticd/left")
+
+
+# -- the configuration
+
+
+def test_a_good_file_is_described_as_check_does() -> None:
+    path = directory("config") / "hapticd.toml"
+    says(configuration.usable(Wanted.of(path)), "ok", f"{path}: ok", "loopback with energy-cycle at 1000 Hz")
+
+
+def test_every_problem_of_a_file_is_a_finding(tmp_path: Path) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_text("[loop]\nrate_hz = 50\n[controller]\nlaw = 'tdap'\n")
+    first, second = configuration.usable(Wanted.of(path))
+    says(first, "problem", f"{path}: loop.rate_hz = 50")
+    says(second, "problem", "controller.law")
+
+
+def test_a_file_that_cannot_be_used_still_says_which_device_it_wants(tmp_path: Path) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_text("[loop]\nrate_hz = 2000\n[device]\ndriver = 'omega7'\nspeed = 3\n[telemetry]\ntcp = 5\n")
+    wanted = Wanted.of(path)
+    assert wanted.loaded is None
+    assert (wanted.driver, wanted.loop.rate_hz, wanted.tcp) == ("omega7", 2000.0, None)
+
+
+@pytest.mark.parametrize("text", ["not toml", "device = 3\nloop = 'fast'", "[device]\ndriver = 7\n[loop]\ncpu = 'x'"])
+def test_a_file_of_nonsense_leaves_the_defaults(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_text(text)
+    wanted = Wanted.of(path)
+    assert (wanted.driver, wanted.loop.rate_hz) == ("loopback", 1000.0)
+    assert {found.mark for found in configuration.usable(wanted)} == {"problem"}
+
+
+def test_a_missing_file_is_copied_from_the_shipped_one(tmp_path: Path) -> None:
+    found = says(configuration.usable(Wanted.of(tmp_path / "none.toml")), "problem", "no such file")
+    assert found.mend[0].startswith("cp ")

@@ -1,0 +1,81 @@
+/* The drd half of the fake SDK. It links to the dhd half, so that both are one bench whatever handle they came by. */
+#include "fake.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <time.h>
+#include <unistd.h>
+
+static int held_by_another(struct device *d) {
+    pid_t holder = (pid_t)d->holder;
+    return holder && holder != getpid() && !(kill(holder, 0) && errno == ESRCH); /* a dead one holds nothing */
+}
+
+int drdOpenID(char ID) {
+    log_call(__func__);
+    if (bench->count < 1)
+        return fail(NO_DEVICE);
+    if (ID < 0 || ID >= bench->count || !bench->device[(int)ID].present)
+        return fail(BAD_INDEX);
+    struct device *d = &bench->device[(int)ID];
+    if (held_by_another(d))
+        return fail(IN_USE);
+    if (!d->calibrated)
+        d->mode = RESET;
+    d->holder = getpid();
+    d->started = d->updates = 0;
+    open_here[(int)ID] = 1;
+    heard(d);
+    return ID;
+}
+
+int drdClose(char ID) {
+    log_call(__func__);
+    if (ID < 0 || ID >= DEVICES || !open_here[(int)ID])
+        return fail(BAD_INDEX);
+    open_here[(int)ID] = 0;
+    bench->device[(int)ID].holder = 0;
+    return 0;
+}
+
+bool drdIsSupported(char ID) {
+    log_call(__func__);
+    struct device *d = device_of(ID);
+    return d && d->type != 60;
+}
+
+bool drdIsInitialized(char ID) {
+    log_call(__func__);
+    struct device *d = device_of(ID);
+    return d && d->calibrated;
+}
+
+/* Moves the arm, and takes its time. */
+int drdAutoInit(char ID) {
+    log_call(__func__);
+    struct device *d = device_of(ID);
+    if (!d)
+        return -1;
+    struct timespec wait = {(time_t)(d->auto_init_us / 1e6), (long)((long long)(d->auto_init_us * 1e3) % 1000000000)};
+    nanosleep(&wait, 0);
+    d->moves++;
+    d->mode = FORCE;
+    heard(d);
+    if (d->auto_init_fails)
+        return fail(TIMEOUT);
+    d->calibrated = d->regulating = 1;
+    for (int axis = 0; axis < 3; axis++)
+        d->position_m[axis] = d->velocity_m_per_s[axis] = 0;
+    return 0;
+}
+
+int drdStop(bool frc, char ID) {
+    log_call(__func__);
+    struct device *d = device_of(ID);
+    if (!d)
+        return -1;
+    d->regulating = 0;
+    if (!frc)
+        trip(d, SOFTWARE);
+    return 0;
+}

@@ -1,0 +1,182 @@
+"""A daemon on a device that can be told to fail, and what the device felt of it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hapticd.contracts.event import EventCode
+from hapticd.faults.file import FaultRecord, read
+from hapticd.faults.store import FaultStore
+from hapticd.faults.summary import Summary, summarise
+from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
+from tests.daemon.test_deaths import pressing
+from tests.faults.faulty_device import WITNESS
+
+DEVICE = Path(__file__).with_name("faulty_device.py")
+
+BAD_LAW = '''
+"""A law that fails the way its name says."""
+import time
+from hapticd.contracts.law import LawParams
+class Params(LawParams):
+    """None."""
+class State:
+    """Counts."""
+    asked: int
+def start(state, params, snapshot):
+    """Count from zero."""
+    state.asked = 0
+def step(state, params, tick):
+    """Fail after 300 ticks in contact; the warm-up takes 200."""
+    state.asked += 1
+    if state.asked > 300:
+        FAIL
+    return tick.contact_n
+'''
+
+Report = Callable[[str, object], None]
+
+
+@dataclass(frozen=True)
+class Felt:
+    """What the device felt since the fault began.
+
+    Attributes:
+        peak_n: largest force that was written to it [N].
+        writes: forces that were written, until it was zero or the device was disabled.
+        gone_after_ms: time until then, None while it is not.
+        force_n: force on it now [N].
+        opened: how often it was opened since the witness was cleared.
+    """
+
+    peak_n: float
+    writes: int
+    gone_after_ms: float | None
+    force_n: float
+    opened: int
+
+
+class Rig:
+    """Give orders to the device of a running daemon."""
+
+    def __init__(self, *, safety: str = "", more: str = "", prefix: Sequence[str] = (), laws: dict[str, str] | None = None):
+        self.directory = Path(tempfile.mkdtemp(prefix="faulty-"))
+        shutil.copy(DEVICE, self.directory / "faulty_device.py")
+        package = self.directory / "faulty_device-1.0.dist-info"
+        package.mkdir()
+        (package / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty-device\nVersion: 1.0\n")
+        (package / "entry_points.txt").write_text("[hapticd.drivers]\nfaulty = faulty_device:Faulty\n")
+        laboratory = self.directory / "mylab"
+        laboratory.mkdir()
+        (laboratory / "__init__.py").touch()
+        for name, failure in (laws or {}).items():
+            (laboratory / f"{name}.py").write_text(BAD_LAW.replace("FAIL", failure))
+        self._order = self.directory / "order"
+        self._witness = self.directory / "witness"
+        self._witness.write_bytes(bytes(WITNESS.size))
+        # Without a wall the hand's own spring holds the device, so that it never leaves its workspace.
+        self.config = f"""
+            [device]
+            driver = "faulty"
+            [device.options]
+            order = "{self._order}"
+            witness = "{self._witness}"
+            hand = {{ force = {{ profile = "constant", newton = -3.0 }}, stiffness_n_per_m = 2000.0, damping_n_s_per_m = 5.0 }}
+            [[scene.walls]]
+            stiffness_n_per_m = 12000.0
+            [safety]
+            {safety}
+            {more}
+        """
+        self.daemon = Daemon(self.config, pythonpath=self.directory, prefix=prefix)
+
+    def __enter__(self) -> Rig:
+        self.daemon.wait_ready()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.daemon.__exit__()
+        shutil.rmtree(self.directory, ignore_errors=True)
+
+    def pressed(self) -> Rig:
+        """Arm, and return when the device holds a force against the hand."""
+        assert self.ask("arm").returncode == 0
+        pressing(self.daemon)
+        return self
+
+    def subscriber(self, *topics: str) -> Subscriber:
+        return Subscriber(self.daemon.endpoint, *topics)
+
+    def ask(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        environment = {
+            **os.environ,
+            "HAPTICD_RUNTIME_DIR": str(self.daemon.directory / "run"),
+            "HAPTICD_STATE_DIR": str(self.daemon.directory / "state"),
+            "PYTHONPATH": str(self.directory),
+        }
+        return subprocess.run([HAPTICD, *arguments], env=environment, capture_output=True, text=True, timeout=60)
+
+    def order(self, text: str) -> None:
+        """Let the device fail from the next tick on."""
+        self._witness_write(force_n=self.felt().force_n)
+        fresh = self._order.with_suffix(".new")
+        fresh.write_text(text)
+        fresh.rename(self._order)
+
+    def mend(self) -> None:
+        """Let the device work again."""
+        self._order.unlink(missing_ok=True)
+
+    def felt(self) -> Felt:
+        force_n, began_ns, gone_ns, peak_n, writes, opened = WITNESS.unpack(self._witness.read_bytes())
+        gone_after_ms = (gone_ns - began_ns) * 1e-6 if gone_ns else None
+        return Felt(peak_n, writes, gone_after_ms, force_n, opened)
+
+    def released(self) -> Felt:
+        """Return when the force on the device is gone."""
+        wait_until(lambda: self.felt().gone_after_ms is not None, "the force to go")
+        return self.felt()
+
+    def recorded(self, code: EventCode) -> tuple[FaultRecord, Summary]:
+        """The fault record of an event, once it is written."""
+        store = FaultStore(self.daemon.directory / "state" / "default" / "faults")
+        wait_until(lambda: any(path.stem.endswith(f"-{code}") for path in store.paths()), f"a fault record of {code}")
+        path = next(path for path in store.paths() if path.stem.endswith(f"-{code}"))
+        record = read(path)
+        assert record.header["event"]["code"] == code
+        return record, summarise(record)
+
+    def goes_on(self, *commands: str) -> None:
+        """The documented way back: these commands, and the device holds the hand again."""
+        for command in commands:
+            answer = self.ask(command)
+            assert answer.returncode == 0, answer.stderr
+        pressing(self.daemon)
+
+    def _witness_write(self, force_n: float) -> None:
+        with self._witness.open("r+b") as file:
+            file.write(WITNESS.pack(force_n, 0, 0, 0.0, 0, 0))
+
+
+def events_until(subscriber: Subscriber, code: EventCode) -> list[dict[str, Any]]:
+    """Every event up to one of this code."""
+    seen = []
+    for topic, fields in subscriber.maps(PATIENCE_S):
+        if topic == "hapticd/event":
+            seen.append(fields)
+            if fields["code"] == code:
+                return seen
+    raise AssertionError(f"no event {code} after {[event['text'] for event in seen]}")
+
+
+def settle(seconds: float) -> None:
+    """Leave time for what must not happen."""
+    time.sleep(seconds)

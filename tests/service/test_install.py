@@ -1,0 +1,152 @@
+"""`make install` and `hapticd service` fill a tree, leave what is the user's, and take the rest away again."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hapticd.installation import Installation, InstallationError
+from tests.service.machine import SOURCE
+
+CONFIG = "etc/hapticd/hapticd.toml"
+FILES = {
+    "etc/hapticd/hapticd.toml",
+    "usr/local/bin/hapticd",
+    "usr/local/lib/systemd/system/hapticd.service",
+    "usr/local/lib/systemd/system/hapticd@.service",
+    "usr/local/lib/sysusers.d/hapticd.conf",
+    "usr/local/lib/tmpfiles.d/hapticd.conf",
+    "usr/local/lib/udev/rules.d/70-hapticd.rules",
+}
+
+
+def files(root: Path) -> set[str]:
+    found = (Path(place) / name for place, inner, names in os.walk(root) for name in [*names, *inner])
+    return {str(path.relative_to(root)) for path in found if path.is_symlink() or path.is_file()}
+
+
+def silent(_line: str) -> None:
+    pass
+
+
+def installed(root: Path, executable: str = "/opt/hapticd/bin/hapticd") -> Installation:
+    installation = Installation(root, Path(executable))
+    installation.install(silent)
+    return installation
+
+
+def make(*arguments: str) -> str:
+    done = subprocess.run(["make", *arguments], cwd=SOURCE, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_every_file_of_the_service_goes_to_its_place_readable_by_all(tmp_path: Path) -> None:
+    previous = os.umask(0o077)
+    try:
+        installed(tmp_path)
+    finally:
+        os.umask(previous)
+    assert files(tmp_path) == FILES
+    assert (tmp_path / "usr/local/bin/hapticd").readlink() == Path("/opt/hapticd/bin/hapticd")
+    for name in FILES - {"usr/local/bin/hapticd"}:
+        assert stat.S_IMODE((tmp_path / name).stat().st_mode) == 0o644
+    assert stat.S_IMODE((tmp_path / "etc/hapticd").stat().st_mode) == 0o755
+
+
+def test_the_units_run_the_hapticd_that_installed_them(tmp_path: Path) -> None:
+    installed(tmp_path, "/srv/lab/bin/hapticd")
+    unit = (tmp_path / "usr/local/lib/systemd/system/hapticd@.service").read_text()
+    assert "ExecStart=/srv/lab/bin/hapticd run" in unit
+    assert "/opt/hapticd" not in unit
+
+
+def test_a_configuration_is_never_overwritten(tmp_path: Path) -> None:
+    installed(tmp_path)
+    (tmp_path / CONFIG).write_text("# mine\n")
+    installed(tmp_path)
+    assert (tmp_path / CONFIG).read_text() == "# mine\n"
+
+
+def test_an_uninstall_leaves_configurations_and_what_others_own(tmp_path: Path) -> None:
+    installation = installed(tmp_path)
+    (tmp_path / "usr/local/lib/udev/rules.d/99-mine.rules").write_text("")
+    (tmp_path / "etc/hapticd/left.toml").write_text("")
+    installation.uninstall(silent)
+    assert files(tmp_path) == {CONFIG, "etc/hapticd/left.toml", "usr/local/lib/udev/rules.d/99-mine.rules"}
+    assert not (tmp_path / "usr/local/lib/systemd").exists()
+    installation.uninstall(silent)
+
+
+def test_a_command_of_the_same_name_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "usr/local/bin").mkdir(parents=True)
+    (tmp_path / "usr/local/bin/hapticd").write_text("somebody else's")
+    installed(tmp_path).uninstall(silent)
+    assert (tmp_path / "usr/local/bin/hapticd").read_text() == "somebody else's"
+
+
+def test_what_is_missing_or_was_changed_is_told(tmp_path: Path) -> None:
+    installation = installed(tmp_path)
+    (tmp_path / "usr/local/lib/tmpfiles.d/hapticd.conf").write_text("# changed\n")
+    (tmp_path / "usr/local/lib/sysusers.d/hapticd.conf").unlink()
+    states = {file.path.parent.name: file.state for file in installation.files()}
+    assert (states["tmpfiles.d"], states["sysusers.d"], states["system"]) == ("changed", "missing", "installed")
+
+
+@pytest.mark.parametrize("place", ["/home/lab/venv/bin/hapticd", "/root/venv/bin/hapticd", "/tmp/venv/bin/hapticd"])
+def test_a_live_installation_from_where_the_sandbox_cannot_look_is_refused(place: str) -> None:
+    with pytest.raises(InstallationError, match=r"the service may not look into /(home|root|tmp), .*make install"):
+        Installation(executable=Path(place)).install(silent)
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "usr").write_text("a file where a directory should be")
+    with pytest.raises(InstallationError, match="usr/local/lib"):
+        installed(tmp_path)
+
+
+def test_status_can_be_read_by_a_program() -> None:
+    hapticd = Path(sys.executable).with_name("hapticd")
+    done = subprocess.run([hapticd, "service", "status", "--json"], capture_output=True, text=True, check=False)
+    shown = json.loads(done.stdout)
+    assert len(shown["files"]) == 5
+    assert done.returncode == (0 if shown["units"] and set(shown["files"].values()) == {"installed"} else 1)
+
+
+@pytest.mark.timeout(600)
+def test_make_installs_into_a_tree_that_does_not_remember_where_it_was_built(tmp_path: Path) -> None:
+    root = tmp_path / "tree"
+    make("install", f"PYTHON={sys.executable}", f"DESTDIR={root}")
+    program = {name for name in files(root) if name.startswith("opt/hapticd/")}
+    assert files(root) - program == FILES
+    assert "opt/hapticd/bin/hapticd" in program
+    texts = [root / name for name in program if (root / name).is_file()]
+    remembering = [path for path in texts if str(root).encode() in path.read_bytes()]
+    assert remembering == []
+    assert (root / "opt/hapticd/bin/hapticd").read_text().startswith("#!/opt/hapticd/bin/python")
+    shared = "import hapticd.share, sys; sys.stdout.write(str(hapticd.share.directory('systemd')))"
+    place = subprocess.run(
+        [root / "opt/hapticd/bin/python", "-c", shared], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert place.stdout.startswith(str(root)), "units come with the wheel, not from the source tree"
+
+    make("uninstall", f"DESTDIR={root}")
+    assert files(root) == {CONFIG}
+
+
+def test_make_uninstall_removes_only_a_directory_of_its_own(tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["make", "uninstall", f"DESTDIR={tmp_path}", "PREFIX=/usr/local"],
+        cwd=SOURCE,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "directory of its own" in done.stdout

@@ -1,0 +1,107 @@
+"""On a cluster of real worker processes no result is lost when one of them is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("distributed")
+
+HAPTICD = Path(sys.executable).with_name("hapticd")
+ROOT = Path(__file__).parents[2]
+BLOCKS = 16
+MAP = ("study", "zwidth", "--cells", "80x100", "--duration", "20", "--laws", "none")
+
+
+class Cluster:
+    """A scheduler and two workers, each a process of its own, without nannies that would start them again."""
+
+    def __init__(self, folder: Path) -> None:
+        self.address = folder / "scheduler.json"
+        self._folder = folder
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-jupyter")
+        wait(self.address.exists)
+        self.url: str = json.loads(self.address.read_text())["address"]
+        self.workers = [self._start("worker", "--no-nanny", "--nthreads", "1", "--no-dashboard") for _ in range(2)]
+
+    def _start(self, role: str, *arguments: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", "--scheduler-file", self.address, *arguments]
+        log = (self._folder / f"{role}-{len(self._processes)}.log").open("wb")
+        with log:
+            process = subprocess.Popen(command, stdout=log, stderr=log, cwd=self._folder, env=environment())
+        self._processes.append(process)
+        return process
+
+    def stop(self) -> None:
+        for process in reversed(self._processes):
+            process.kill()
+            process.wait()
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def wait(condition: Callable[[], bool], at_most_s: float = 60.0) -> None:
+    until = time.monotonic() + at_most_s
+    while not condition():
+        assert time.monotonic() < until, "waited in vain"
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    (tmp_path / "cluster").mkdir()
+    running = Cluster(tmp_path / "cluster")
+    try:
+        yield running
+    finally:
+        running.stop()
+
+
+def finished(journal: Path) -> int:
+    return max(0, journal.read_bytes().count(b"\n") - 1) if journal.exists() else 0
+
+
+def test_a_worker_that_is_killed_in_the_middle_costs_no_result(cluster: Cluster, tmp_path: Path) -> None:
+    command = [HAPTICD, *MAP, "--output", tmp_path / "far", "--cluster", cluster.url]
+    study = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    journal = tmp_path / "far" / "zwidth.journal"
+    wait(lambda: finished(journal) >= 2 or study.poll() is not None)
+    victim, survivor = cluster.workers
+    victim.send_signal(signal.SIGKILL)
+    before = finished(journal)
+    _, said = study.communicate(timeout=100)
+    assert study.returncode == 0, said
+    assert 2 <= before < BLOCKS - 2  # it died with work still to do
+    assert victim.wait() == -signal.SIGKILL
+    assert survivor.poll() is None
+
+    subprocess.run([HAPTICD, *MAP, "--output", tmp_path / "near"], check=True, capture_output=True)
+    for name in ("zwidth.csv", "zwidth.json", "zwidth.png"):
+        assert (tmp_path / "far" / name).read_bytes() == (tmp_path / "near" / name).read_bytes()
+
+
+def test_a_cluster_that_is_gone_leaves_what_was_done(cluster: Cluster, tmp_path: Path) -> None:
+    """The scheduler dies: one line, and the same command goes on from the journal, here without a cluster."""
+    command = [HAPTICD, *MAP, "--output", tmp_path / "out"]
+    study = subprocess.Popen([*command, "--cluster", cluster.url], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    journal = tmp_path / "out" / "zwidth.journal"
+    wait(lambda: finished(journal) >= 2 or study.poll() is not None)
+    cluster.stop()
+    _, said = study.communicate(timeout=100)
+    assert study.returncode == 1
+    assert b"lost the scheduler" in said
+    assert b"Traceback" not in said
+    assert finished(journal) >= 2
+    assert subprocess.run(command, check=False, capture_output=True).returncode == 0
+    assert not journal.exists()

@@ -1,0 +1,81 @@
+"""Settled means still and in place; each alone is not enough."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from hapticd import registry
+from hapticd.config.models import WallConfig
+from hapticd.simulation.batch import Batch, Point
+from hapticd.simulation.options import SimulationOptions
+from hapticd.study.verdict import Criterion, Outcome, balance_m, misplaced_m
+
+CRITERION = Criterion()
+
+
+def press(stiffness: float, newton: float, law: str = "none", **device: Any) -> tuple[Point, Any]:
+    hand = {"force": {"profile": "constant", "newton": -newton}, **device.pop("hand", {})}
+    wall = WallConfig.model_validate({"stiffness_n_per_m": stiffness, **device.pop("wall", {})})
+    options = SimulationOptions.model_validate({"hand": hand, **device})
+    module = registry.law(law)
+    point = Point(options, wall, module.Params(), max_force_n=12.0)
+    return point, Batch(module, [point], 4.0, CRITERION.window_s, ledger=False).run_interpreted()
+
+
+def outcome(stiffness: float, newton: float, law: str = "none", **device: Any) -> Outcome:
+    point, result = press(stiffness, newton, law, **device)
+    (found,) = CRITERION.judge([point], result)
+    return Outcome(found)
+
+
+def test_a_soft_wall_settles_and_a_hard_one_keeps_moving() -> None:
+    assert outcome(5000.0, 3.0) is Outcome.SETTLED
+    assert outcome(12000.0, 3.0) is Outcome.MOVING
+
+
+def test_a_law_that_rests_two_newtons_too_shallow_has_not_settled() -> None:
+    law = "tests.study.pushing_law"
+    point, result = press(5000.0, 3.0, law, resolution_m=0.0)
+    assert result.peak_to_peak_m[0] < CRITERION.still_m
+    assert misplaced_m([point], result)[0] == pytest.approx(-2.0 / 5000.0, rel=1e-3)
+    assert outcome(5000.0, 3.0, law, resolution_m=0.0) is Outcome.ELSEWHERE
+
+
+def test_an_active_device_diverges() -> None:
+    assert outcome(3000.0, 3.0, viscous_n_s_per_m=-60.0, max_force_n=0.0) is Outcome.DIVERGED
+
+
+def test_the_spring_of_the_hand_moves_the_place_and_so_does_a_wall_that_stiffens() -> None:
+    held, _ = press(5000.0, 3.0, hand={"stiffness_n_per_m": 1000.0})
+    stiffened, _ = press(3000.0, 3.0, wall={"changes": [{"at_s": 1.0, "stiffness_n_per_m": 6000.0}]})
+    assert balance_m(held) == balance_m(stiffened) == pytest.approx(-5e-4)
+    assert outcome(5000.0, 3.0, hand={"stiffness_n_per_m": 1000.0}) is Outcome.SETTLED
+    assert outcome(3000.0, 3.0, wall={"changes": [{"at_s": 1.0, "stiffness_n_per_m": 6000.0}]}) is Outcome.SETTLED
+
+
+def test_friction_may_hold_a_device_beside_the_balance() -> None:
+    """1 N of friction at 1 kN/m: anywhere within 1 mm nothing moves it, and no law is to blame."""
+    stuck = {"coulomb_n": 1.0, "initial_position_m": -2.9e-3, "viscous_n_s_per_m": 40.0}
+    point, result = press(1000.0, 2.0, **stuck)
+    off_m = abs(misplaced_m([point], result)[0])
+    assert 0.1 * 2e-3 < off_m < 1e-3
+    assert outcome(1000.0, 2.0, **stuck) is Outcome.SETTLED
+
+
+def test_stillness_is_never_finer_than_the_sensor() -> None:
+    assert CRITERION.still_limit_m(SimulationOptions(resolution_m=1e-6)) == 5e-5
+    assert CRITERION.still_limit_m(SimulationOptions(resolution_m=1e-4)) == 2e-4
+
+
+def test_a_hand_that_does_not_press_has_no_balance() -> None:
+    assert math.isnan(balance_m(press(5000.0, 0.0)[0]))
+
+
+def test_every_output_says_what_settled_means() -> None:
+    declared = Criterion(still_m=1e-4, place_share=0.05).declared()
+    assert "at most 0.1 mm" in declared["words"]
+    assert "within 5 %" in declared["words"]
+    assert declared["still_m"] == 1e-4
