@@ -217,7 +217,3 @@ def _tick(seq: int, deadline_ns: int) -> TickRecord:
         orientation=(),
         walls=(wall,),
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())
