@@ -29,8 +29,9 @@ help:
 run: $(READY)
 	$(BIN)/hapticd run --config config/hapticd.toml --watch
 
+# Most of the time is spent waiting for daemons that run in real time, so more workers than processors.
 test: packages lint
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses 4 --dist loadfile
 
 lint: $(READY)
 	$(BIN)/ruff check

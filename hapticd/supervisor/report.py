@@ -15,6 +15,7 @@ from hapticd.telemetry.wire import timestamp_s
 
 if TYPE_CHECKING:
     from hapticd.config.loading import LoadedConfig
+    from hapticd.control.predecessor import Predecessor
     from hapticd.supervisor.controlled import Control
     from hapticd.supervisor.recovery import Recovery
 
@@ -37,6 +38,8 @@ class Report:
 
     def __init__(self, instance: str, epoch_offset_ns: int) -> None:
         self.last: TickRecord | None = None
+        self._flags = 0
+        self._law = 0
         self.rate_hz = 0.0
         self.status = Status()
         self._instance = instance
@@ -57,6 +60,13 @@ class Report:
         if records:
             self._ticks += len(records)
             self.last = records[-1]
+            self._flags = self.last.flags
+            self._law = self.last.law
+
+    def expect(self, before: Predecessor) -> None:
+        """A loop that has not ticked yet goes on from there."""
+        self._flags = Flag.LATCHED if before.latched else 0
+        self._law = before.law
 
     def add_dropped(self, ticks: int) -> None:
         """Count ticks that were overwritten before they were fetched."""
@@ -72,9 +82,9 @@ class Report:
         self._measure_rate()
         settings = config.config
         info = control.info
-        flags = self.last.flags if self.last else 0
         if recovery.lost:
-            flags = Flag.LATCHED if recovery.before.latched else 0
+            self.expect(recovery.before)
+        flags = self._flags
         limit_n = settings.safety.max_force_n or info.max_force_n
         lifted = settings.safety.profile == "simulation" or limit_n == math.inf
         self.status = Status(
@@ -93,7 +103,7 @@ class Report:
             releasing=bool(flags & Flag.RELEASING),
             latched=bool(flags & Flag.LATCHED),
             law=settings.controller.law,
-            law_index=self.last.law if self.last else 0,
+            law_index=self._law,
             driver=settings.device.driver,
             device=info.model,
             serial=info.serial,
@@ -129,4 +139,4 @@ class Report:
 
 def _missing(recovery: Recovery) -> str:
     in_s = recovery.next_try_s - time.monotonic()
-    return f"no device ({recovery.why}); {f'next try in {in_s:.0f} s' if in_s > 0.0 else 'trying to find it'}"
+    return f"no device: {recovery.why}; {f'next try in {in_s:.0f} s' if in_s > 0.0 else 'trying now'}"

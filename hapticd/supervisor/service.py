@@ -133,6 +133,8 @@ class Service:
         now_s = time.monotonic()
         self.control.beat()
         self._publish()
+        if self._device_lost is not None and self.report.last is not None and not self._stopping:
+            self._begin_recovery(self._device_lost)
         self._obey()
         if self.recovery.lost:
             self._look_for_device()
@@ -174,24 +176,25 @@ class Service:
         if self.control.exit_code is not None:
             self._control_ended()
         elif self.control.stalled():
-            if self._device_lost is not None:  # it hangs while it lets go of a device that is gone
-                self.control.kill()
-            else:
-                self._control_lost(f"the control loop stood still for more than {self.control.stall_s:g} s")
+            self._control_lost(f"the control loop stood still for more than {self.control.stall_s:g} s")
         elif self._stopping and now_s > self._stop_by_s:
             self._control_lost(f"the control loop did not stop within {STOP_TIMEOUT_S:g} s")
 
     def _look_for_device(self) -> None:
         """Try again when it is time; that nothing ticks meanwhile is no reason for systemd to intervene."""
         self._feed_watchdog()
+        if self.control.exit_code is None:
+            if self.control.stalled():  # in a driver that cannot let go of a device that is gone
+                self.control.kill()
+            return
         control = self.recovery.turn(self.config)
         if control is None:
             return
         self.control.close()
         self.control = control
         self.requests = Requests(control.shared)
-        self._device_lost = None
         self._dropped_told = 0
+        self.report.expect(self.recovery.before)
         away_s = time.monotonic() - self.recovery.lost_s
         self._tell_now(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)
 
@@ -225,12 +228,18 @@ class Service:
         if self._stopping and (code == 0 or self._device_lost is not None):
             log.info("stopped")
             self.exit_code = 0
-        elif self._device_lost is not None and self.report.last is not None:
-            self.requests.abandon(self._device_lost.text)
-            self.recovery.begin(self._predecessor(), self._device_lost.text)
         else:
             how = f"was killed by signal {-code}" if code and code < 0 else f"ended with exit code {code}"
             self._control_lost(f"the control process {how}")
+
+    def _begin_recovery(self, event: Event) -> None:
+        """The loop has told that its device is gone; it is just ending."""
+        self._device_lost = None
+        while self._publish():
+            pass
+        self.chronicle.recorder.loop_ended()
+        self.requests.abandon(event.text)
+        self.recovery.begin(self._predecessor(), event.text.removeprefix("device lost: "))
 
     def _predecessor(self) -> Predecessor:
         """What the control process that lost its device leaves to the next one."""

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgpack
+import zmq
+
 from hapticd.contracts.event import EventCode
 from hapticd.faults.file import FaultRecord, read
 from hapticd.faults.store import FaultStore
@@ -67,7 +70,9 @@ class Felt:
 class Rig:
     """Give orders to the device of a running daemon."""
 
-    def __init__(self, *, safety: str = "", more: str = "", prefix: Sequence[str] = (), laws: dict[str, str] | None = None):
+    def __init__(
+        self, *, safety: str = "", more: str = "", prefix: Sequence[str] = (), laws: dict[str, str] | None = None
+    ):
         self.directory = Path(tempfile.mkdtemp(prefix="faulty-"))
         shutil.copy(DEVICE, self.directory / "faulty_device.py")
         package = self.directory / "faulty_device-1.0.dist-info"
@@ -108,14 +113,34 @@ class Rig:
 
     def pressed(self) -> Rig:
         """Arm, and return when the device holds a force against the hand."""
-        assert self.ask("arm").returncode == 0
+        assert self.ask("arm")["ok"]
         pressing(self.daemon)
         return self
 
     def subscriber(self, *topics: str) -> Subscriber:
         return Subscriber(self.daemon.endpoint, *topics)
 
-    def ask(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def ask(self, do: str, **fields: bool) -> dict[str, Any]:
+        """The daemon's answer to a request."""
+        context = zmq.Context()
+        socket = context.socket(zmq.DEALER)
+        try:
+            socket.connect(f"ipc://{self.daemon.directory}/run/default/control")
+            socket.send(msgpack.packb({"do": do, **fields}))
+            assert socket.poll(int(PATIENCE_S * 1e3)), f"no answer to {do}"
+            answer: dict[str, Any] = msgpack.unpackb(socket.recv())
+        finally:
+            socket.close(0)
+            context.term()
+        return answer
+
+    def switch(self, more: str = "") -> None:
+        """Let the daemon take an edited file."""
+        self.daemon.config.write_text(self.config + more)
+        answer = self.ask("reload", wait=True)
+        assert answer["ok"], answer["text"]
+
+    def hapticd(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         environment = {
             **os.environ,
             "HAPTICD_RUNTIME_DIR": str(self.daemon.directory / "run"),
@@ -158,7 +183,7 @@ class Rig:
         """The documented way back: these commands, and the device holds the hand again."""
         for command in commands:
             answer = self.ask(command)
-            assert answer.returncode == 0, answer.stderr
+            assert answer["ok"], answer["text"]
         pressing(self.daemon)
 
     def _witness_write(self, force_n: float) -> None:

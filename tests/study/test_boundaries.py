@@ -74,7 +74,7 @@ def test_nothing_stabilises_what_dissipates_nothing_or_is_damped_too_much() -> N
     assert boundaries.stable_limit(Loop(0.25, 1.0, T, wall_damping_n_s_per_m=600.0)) == 0.0
 
 
-LOOPS = {
+LOOPS: dict[str, dict[str, Any]] = {
     "spring": {},
     "spring, one sample late": {"delay": 1},
     "spring, three samples late": {"delay": 3},
@@ -87,7 +87,7 @@ LOOPS = {
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_the_simulated_loop_rings_down_below_the_limit_and_up_above_it(name: str) -> None:
-    keys: dict[str, Any] = LOOPS[name]
+    keys = LOOPS[name]
     hand = keys.get("hand", {})
     loop = Loop(
         0.25 + hand.get("mass_kg", 0.0),

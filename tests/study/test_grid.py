@@ -157,7 +157,7 @@ def test_a_missing_extra_is_named() -> None:
 
 def test_what_would_not_fit_into_memory_is_refused() -> None:
     require_memory(1e6, "--cells 10x10")
-    with pytest.raises(ConfigError, match="--cells 1e9x1e9: would take .* GiB"):
+    with pytest.raises(ConfigError, match=r"--cells 1e9x1e9: would take \S+ GiB"):
         require_memory(1e24, "--cells 1e9x1e9")
 
 

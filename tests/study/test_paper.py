@@ -36,6 +36,7 @@ HOLD = {
     "unstable-alone",
     "false-cycles",
     "window-needed-literal",
+    "window-needed-spring",
     "held",
     "gain",
     "energy-below-zero",
@@ -44,7 +45,7 @@ HOLD = {
     "low-velocity",
     "no-credit",
 }
-DO_NOT_HOLD = {"window-needed", "window-needed-spring", "tdpa-bounded", "tdpa-energy"}
+DO_NOT_HOLD = {"window-needed", "tdpa-bounded", "tdpa-energy"}
 
 
 def silent(_what: str, _done: float) -> None:

@@ -58,7 +58,7 @@ def test_the_spring_of_the_hand_moves_the_place_and_so_does_a_wall_that_stiffens
 
 def test_friction_may_hold_a_device_beside_the_balance() -> None:
     """1 N of friction at 1 kN/m: anywhere within 1 mm nothing moves it, and no law is to blame."""
-    stuck = {"coulomb_n": 1.0, "initial_position_m": -2.9e-3, "viscous_n_s_per_m": 40.0}
+    stuck: dict[str, Any] = {"coulomb_n": 1.0, "initial_position_m": -2.9e-3, "viscous_n_s_per_m": 40.0}
     point, result = press(1000.0, 2.0, **stuck)
     off_m = abs(misplaced_m([point], result)[0])
     assert 0.1 * 2e-3 < off_m < 1e-3

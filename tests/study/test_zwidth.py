@@ -16,11 +16,14 @@ from typing import Any
 import pytest
 
 from hapticd.cli import main
+from hapticd.config.loading import parse
 from hapticd.study.grid import job
+from hapticd.study.grid.journal import Row
 from hapticd.study.zwidth import sweep
 from hapticd.study.zwidth.plane import QUANTITIES, parse_axis
+from hapticd.study.zwidth.scenario import scenario_of
 
-HAPTICD = Path(sys.executable).with_name("hapticd")
+HAPTICD = str(Path(sys.executable).with_name("hapticd"))
 FILES = ("zwidth.csv", "zwidth.json", "zwidth.png")
 SMALL = ("--cells", "12x5", "--duration", "2", "--laws", "none")
 
@@ -95,7 +98,18 @@ def test_a_line_without_an_edge_says_so(tmp_path: Path) -> None:
 
 
 def test_with_several_starts_every_one_of_them_has_to_settle(tmp_path: Path) -> None:
-    plane = ("--x", "stiffness=6e3..10e3", "--y", "hand-force=1..6", "--cells", "9x4", "--duration", "2", "--laws", "none")
+    plane = (
+        "--x",
+        "stiffness=6e3..10e3",
+        "--y",
+        "hand-force=1..6",
+        "--cells",
+        "9x4",
+        "--duration",
+        "2",
+        "--laws",
+        "none",
+    )
     (once,) = mapped(tmp_path / "once", *plane)["laws"]
     (often,) = mapped(tmp_path / "often", *plane, "--starts", "5")["laws"]
     assert often["settled"] < once["settled"]
@@ -124,7 +138,7 @@ def test_every_parameter_can_be_varied(name: str) -> None:
     ranges = {"delay": (0.0, 2.0), "rate": (500.0, 2000.0), "damping": (-1.0, 20.0)}
     low, high = ranges.get(name, (0.001, 0.002))
     axis = parse_axis(f"{name}={low}..{high}", 3, "--x")
-    base = sweep.scenario_of(sweep.parse((ROOT / "config/wall-12-none.toml").read_text(), "wall-12-none.toml"))
+    base = scenario_of(parse((ROOT / "config/wall-12-none.toml").read_text(), "wall-12-none.toml"))
     scenarios = [axis.quantity.put(base, value) for value in axis.values]
     assert len(set(map(repr, scenarios))) == 3
     assert len(axis.quantity.column) > len("kg")
@@ -157,7 +171,7 @@ def test_an_interrupted_map_goes_on_to_the_same_files(tmp_path: Path, monkeypatc
     original = sweep._block
     done: list[int] = []
 
-    def interrupted(spec: dict[str, Any], block: int, threads: int | None) -> list[job.Row]:
+    def interrupted(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
         if len(done) == 3:
             raise KeyboardInterrupt
         done.append(block)
@@ -169,7 +183,7 @@ def test_an_interrupted_map_goes_on_to_the_same_files(tmp_path: Path, monkeypatc
         assert zwidth(*SMALL, "--output", str(tmp_path / "broken")) == 130
     assert not (tmp_path / "broken" / "zwidth.csv").exists()
 
-    def counted(spec: dict[str, Any], block: int, threads: int | None) -> list[job.Row]:
+    def counted(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
         assert block not in done
         return original(spec, block, threads)
 
@@ -181,8 +195,8 @@ def test_an_interrupted_map_goes_on_to_the_same_files(tmp_path: Path, monkeypatc
 
 
 def test_a_killed_map_goes_on_to_the_same_files(tmp_path: Path) -> None:
-    arguments = ("--cells", "60x40", "--duration", "15", "--laws", "none", "--y", "mass=0.1..1")
-    command = [HAPTICD, "study", "zwidth", *arguments, "--output", tmp_path / "killed"]
+    arguments = ("--cells", "60x40", "--duration", "10", "--laws", "none", "--y", "mass=0.1..1")
+    command = [HAPTICD, "study", "zwidth", *arguments, "--output", str(tmp_path / "killed")]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     journal = tmp_path / "killed" / "zwidth.journal"
     while process.poll() is None and (not journal.exists() or journal.read_bytes().count(b"\n") < 2):
@@ -212,7 +226,10 @@ REFUSED: dict[str, tuple[Sequence[str], str]] = {
     "no cells": (["--cells", "0x4"], "--cells 0x4: must be"),
     "more cells than memory": (["--cells", "900000x900000"], "GiB of memory"),
     "an unknown method": (["--method", "guess"], "must be grid or bisect"),
-    "bisection over whole numbers": (["--method", "bisect", "--x", "delay=0..3", "--y", "mass=1..2"], "give delay to --y"),
+    "bisection over whole numbers": (
+        ["--method", "bisect", "--x", "delay=0..3", "--y", "mass=1..2"],
+        "give delay to --y",
+    ),
     "no time": (["--duration", "0"], "--duration 0: must be more than 0 s"),
     "an unknown law": (["--laws", "nolaw"], "no law 'nolaw'"),
     "an unknown parameter of a law": (["--laws", "tdpa:cap=3"], "cap = 3: unknown key"),

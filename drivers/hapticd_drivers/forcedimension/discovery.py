@@ -62,13 +62,17 @@ def open_device(sdk: Sdk, serial: int | None) -> OpenDevice:
     for found in _each(sdk):
         if isinstance(found, DriverError):
             refusals.append(found)
-        elif (serial is None or found.serial == serial) and found.type in MODELS and found.id not in _in_use:
+        elif found.id in _in_use:
+            refusals.append(
+                DeviceBusyError(f"omega7: {_name(found.type)} {found.serial} is already open in this process")
+            )
+        elif (serial is None or found.serial == serial) and found.type in MODELS:
             _in_use.add(found.id)
             return found
         else:
             others.append(f"{_name(found.type)} {found.serial}")
             _release(sdk, found.id)
-    if others and serial is not None:
+    if others and serial is not None and not refusals:
         raise DeviceNotFoundError(f"omega7: no device has serial number {serial}; there is {', '.join(others)}")
     if refusals:
         raise _told(sdk, refusals[0])

@@ -109,6 +109,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         settings.configure(sdk, device, options)
         silence_ms = settings.set_watchdog(sdk, device, options.watchdog_ms, self.period_s)
         self._prepare(sdk, model.wrist, model.gripper, buttons)
+        self._stop_what_was_left_on()
         return DeviceInfo(
             model=f"{model.name}, left-handed" if self._left else model.name,
             serial=str(found.serial),
@@ -243,6 +244,13 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         self._get_buttons = functools.partial(sdk.dhdGetButtonMask, device)
         self._get_status = functools.partial(sdk.dhdGetStatus, self._status, device)
         self._set_force = sdk.dhdSetForceAndTorqueAndGripperForce
+
+    def _stop_what_was_left_on(self) -> None:
+        """A program that died, or a cable that was pulled, may have left forces on; no other mode is touched."""
+        if self._get_status() < 0:
+            raise self._opened().failure("dhdGetStatus")
+        if self._status[STATUS_FORCE]:
+            self._disable()
 
     def _no_velocity(self) -> None:
         """The SDK has no velocity until two samples lie in its window; any other reason is an error."""

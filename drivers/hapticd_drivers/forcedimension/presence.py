@@ -92,8 +92,8 @@ def explain(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: 
     if seen:
         name = f"{VENDOR:04x}:{seen[0].product:04x}, {seen[0].where}"
         return DeviceNotFoundError(
-            f"omega7: a Force Dimension device is on USB ({name}) and may be opened, yet the SDK does not find it: switch "
-            "it off and on again; if that does not help, the SDK may be older than the device"
+            f"omega7: a Force Dimension device is on USB ({name}) and may be opened, yet the SDK does not find it: "
+            "switch it off and on again; if that does not help, the SDK may be older than the device"
         )
     if _FALCON in others:
         return DeviceNotFoundError(

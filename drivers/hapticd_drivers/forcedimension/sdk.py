@@ -73,7 +73,10 @@ class Sdk:
 
         Raises:
             DriverError: it failed.
+            PluginError: this SDK does not have it.
         """
+        if not self.has(name):
+            raise PluginError(f"omega7: SDK {_dotted(self.version)} has no {name}, which the configuration asks for")
         result: int = getattr(self, name)(*arguments)
         if result < 0:
             raise self.failure(name)

@@ -33,7 +33,7 @@ def blocks(address: str, job: Job, wanted: Sequence[int]) -> Iterator[tuple[int,
         ConfigError: no such address, or nobody works there.
         HapticdError: the scheduler is gone, or the workers cannot do it.
     """
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here in one line
+    _hush()
     try:
         client = _dask.Client(address, timeout=_ANSWERS_WITHIN_S, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -77,6 +77,13 @@ def _block(work: Work, spec: object, block: int, laws: tuple[str, ...], digest: 
         )
     with _ONE_AT_A_TIME:
         return work(spec, block, worker.state.nthreads)
+
+
+def _hush() -> None:
+    """Keep dask's own log from the terminal: what matters is said here, in one line."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 def _first_line(error: BaseException) -> str:

@@ -80,4 +80,6 @@ def millimetres(span_m: float) -> str:
     """A span for people."""
     if not np.isfinite(span_m):
         return "without bound"
+    if span_m < 1e-9:
+        return "0"
     return f"{span_m * 1e3:.2g} mm" if span_m >= 1e-5 else f"{span_m * 1e6:.2g} um"

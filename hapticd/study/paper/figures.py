@@ -69,7 +69,7 @@ def converging(evidence: Evidence) -> Figure:
 def without_window(evidence: Evidence) -> Figure:
     """Fig. 7: false cycles and what they do, with and without the window, in two readings."""
     names = ("fig7", "fig7-literal", "fig7-literal-window")
-    titles = ("spring energy, capped\nno window", "E_tot, no cap\nno window", "E_tot, no cap\nwindow 2+2")
+    titles = ("as shipped\nno window", "E_tot, no cap\nno window", "E_tot, no cap\nwindow 2+2")
     figure, grid = sheet(WIDTH_IN, 5.8, 3, 3)
     for column, (name, title) in enumerate(zip(names, titles, strict=True)):
         run = evidence.runs[name]

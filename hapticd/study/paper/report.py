@@ -38,6 +38,8 @@ figcaption b { color: var(--ink); display: block; }
 td .small, th .small { font-size: .94em; color: var(--soft); font-weight: 400; }
 .claims td:nth-child(1) { width: 8%; } .claims td:nth-child(2) { width: 31%; } .claims td:nth-child(3) { width: 27%; }
 .claims td:nth-child(4) { width: 10%; }
+.runs th, .runs td { padding: .4rem .34rem; }
+.runs tr.run td { border-bottom: none; padding-bottom: 0; } .runs tr.run { break-after: avoid; }
 .wide { overflow-x: auto; }
 .small { font-size: .9rem; color: var(--soft); }
 @media print {
@@ -122,7 +124,6 @@ def _figure(plate: Plate, picture: bytes) -> str:
 
 def _runs(evidence: Evidence) -> str:
     titles = (
-        ("run", ""),
         ("outcome", ""),
         ("settled", "s"),
         ("cycles", "to settle, all"),
@@ -137,8 +138,9 @@ def _runs(evidence: Evidence) -> str:
     )
     head = "".join(f'<th class="number">{title}<br><span class="small">{unit}</span></th>' for title, unit in titles)
     rows = [
-        f"<tr><td>{_text(name)}<br><span class='small'>{_text(evidence.runs[name].scenario.title)}</span></td>"
-        + "".join(f'<td class="number">{cell}</td>' for cell in _cells(figures))
+        f'<tr class="run"><td colspan="{len(titles)}"><b>{_text(name)}</b> '
+        f'<span class="small">{_text(evidence.runs[name].scenario.title)}</span></td></tr><tr>'
+        + "".join(f'<td class="number">{_text(cell)}</td>' for cell in _cells(figures))
         + "</tr>"
         for name, figures in evidence.figures.items()
     ]
@@ -183,7 +185,7 @@ def _readings(evidence: Evidence) -> str:
         damping = _short(float(np.abs(table.damping_n_s_per_m[at]).max()))
         rows.append(
             f"<tr><td>{_text(reading.name)}</td><td class='number'>{passed}</td>"
-            f"<td class='number'>{millimetres(float(spans.max()))}</td><td class='number'>{damping}</td>"
+            f"<td class='number'>{_text(millimetres(float(spans.max())))}</td><td class='number'>{damping}</td>"
             f"<td class='remark'>{_text(shown)}</td></tr>"
         )
     head = (

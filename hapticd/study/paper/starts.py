@@ -52,7 +52,7 @@ class Size:
 
 
 FULL = Size(starts=63, map_hands=32, map_starts=41)
-QUICK = Size(starts=7, map_hands=4, map_starts=5)
+QUICK = Size(starts=5, map_hands=3, map_starts=4)
 
 
 def press(

@@ -31,9 +31,8 @@ def _shipped(evidence: Evidence) -> Claim:
         "window-needed",
         "the shipped reading",
         "shipped",
-        "The shipped reading measures the energy of the spring alone, so that a false cycle between two counts of the "
-        "position adds almost nothing, and it bounds the damping. Under E_tot without a bound the claim comes out: see "
-        "window-needed-literal.",
+        "What the shipped reading adds to the print, a bound for cycles of a few counts and one for the damping, makes "
+        "false cycles harmless. Without it the claim comes out: see the next two.",
     )
 
 
@@ -41,24 +40,23 @@ def _spring(evidence: Evidence) -> Claim:
     return _needed(
         evidence,
         "window-needed-spring",
-        "energy of the spring, no bound on the damping",
+        "energy of the spring, nothing added to the print",
         "spring",
-        "With the energy of the spring alone false cycles still add little, bound or not.",
+        "Between two counts a false cycle divides what it finds by hardly any motion, and the damping runs away.",
     )
 
 
 def _literal(evidence: Evidence) -> Claim:
     ends = [evidence.figures[name].damping_n_s_per_m for name in ("fig7-literal", "fig7-literal-window")]
-    claim = _needed(
+    return _needed(
         evidence,
         "window-needed-literal",
-        "E_tot, no bound on the damping",
+        "E_tot, nothing added to the print",
         "literal",
         "E_tot contains the work of the damping itself; between two counts it says little about the wall, and the "
         "damping that follows from it is beyond what a sampled loop can hold: at the end "
         f"{ends[0]:.0f} N s/m without the window, {ends[1]:.0f} with it.",
     )
-    return claim
 
 
 def _needed(evidence: Evidence, key: str, reading: str, name: str, remark: str) -> Claim:

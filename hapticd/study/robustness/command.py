@@ -90,9 +90,10 @@ def command(
         console.print(f"{one.device}: {one.reason}: {one.command}", soft_wrap=True, markup=False)
     unlisted = len(found.failures) - len(near[:_LISTED])
     if unlisted:
+        beyond = len(found.failures) - len(near)
         console.print(
-            f"{unlisted} more do not settle, {len(found.failures) - len(near)} of them beyond the reach of damping; each "
-            f"with its reason and the command that replays it: {folder / _FILES[1]}, not_settled",
+            f"{unlisted} more do not settle, {beyond} of them beyond the reach of damping; each with its reason and "
+            f"the command that replays it: {folder / _FILES[1]}, not_settled",
             soft_wrap=True,
         )
     console.print(f"{plan.criterion.words()}", soft_wrap=True, markup=False)

@@ -34,7 +34,7 @@ EDGE_COLUMNS = ("settles_at_low_end", "settles_at_high_end", "edge_low", "edge_h
 """Of each line: whether its ends settle, and the bracket that holds the edge between them; NaN when there is none."""
 
 STARTS_SPREAD_M = 0.01
-_TICKS_PER_BLOCK = 1e7
+_TICKS_PER_BLOCK = 4e6
 _CELL_BYTES = 900.0
 """Of one cell in rows, tables and pictures, measured generously."""
 

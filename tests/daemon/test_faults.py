@@ -1,0 +1,348 @@
+"""Every fault provoked on a real daemon and a device that pushes: what the device feels, what is said, the way back.
+
+Times and forces are kept with `pytest --junit-xml`; docs/faults.md quotes them. Nothing here asserts a time of the
+clock: a ramp is counted in writes to the device, which go at the rate of the loop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import zmq
+
+from hapticd.contracts.event import EventCode
+from hapticd.faults.store import FaultStore
+from tests.daemon.running import Subscriber, all_records, wait_until
+from tests.daemon.test_deaths import nothing_left, pressing
+from tests.faults.rig import Felt, Report, Rig, events_until, settle
+
+LIMIT_N = 12.0
+RAMP = 50
+"""Ticks of `safety.ramp_s`."""
+
+BLIND_RAMP = 10
+FROZEN = 20
+
+
+def keep(report: Report, felt: Felt) -> None:
+    report("writes_until_released", felt.writes)
+    report("peak_force_n", felt.peak_n)
+    report("released_after_ms", felt.gone_after_ms)
+
+
+def codes(events: list[dict[str, object]]) -> list[object]:
+    return [event["code"] for event in events if isinstance(event["code"], int) and event["code"] >= 200]
+
+
+@pytest.mark.parametrize(
+    ("order", "code", "most_writes"),
+    [
+        ("nan", EventCode.SAMPLE_IMPOSSIBLE, BLIND_RAMP),
+        ("far", EventCode.SAMPLE_IMPOSSIBLE, BLIND_RAMP),
+        ("jump", EventCode.OVER_SPEED, RAMP),
+        ("frozen", EventCode.DEVICE_FROZEN, FROZEN + RAMP),
+        ("slow 70", EventCode.LOOP_LATE, RAMP + 2),
+    ],
+)
+def test_what_the_device_does_wrong_takes_the_force_out_by_a_ramp_until_cleared(
+    order: str, code: EventCode, most_writes: int, record_property: Report
+) -> None:
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        before_n = abs(rig.felt().force_n)
+        rig.order(order)
+        events = events_until(subscriber, code)
+        felt = rig.released()
+        keep(record_property, felt)
+        assert felt.writes <= most_writes
+        assert felt.peak_n <= LIMIT_N
+        if code == EventCode.SAMPLE_IMPOSSIBLE:
+            assert felt.peak_n <= before_n + 1.0, "where nobody knows the position the last force is let out, no more"
+        assert subscriber.until("hapticd/status", latched=True, armed=False, releasing=False)["fault_code"] == code
+        record, summary = rig.recorded(code)
+        assert summary.ramp_ticks is not None
+        assert summary.ramp_ticks <= RAMP
+        assert summary.after_s >= 0.9
+        assert [after.seq - before.seq for before, after in pairwise(record.ticks)].count(1) == len(record.ticks) - 1
+        rig.mend()
+        refused = rig.ask("arm")
+        assert not refused["ok"]
+        assert "hapticd clear" in refused["text"]
+        assert codes(events) == [code]
+        rig.goes_on("clear", "arm")
+
+
+@pytest.mark.parametrize(
+    ("failure", "code", "most_ticks"),
+    [
+        ("raise ValueError('no idea')", EventCode.LAW_FAILED, RAMP),
+        ("return float('nan')", EventCode.LAW_FAILED, RAMP),
+        ("time.sleep(0); end = time.monotonic() + 7e-4\n        while time.monotonic() < end: pass",
+         EventCode.LAW_OVER_BUDGET, RAMP),
+    ],
+)  # fmt: skip
+def test_a_law_that_fails_is_ramped_out_with_damping(
+    failure: str, code: EventCode, most_ticks: int, record_property: Report
+) -> None:
+    with Rig(laws={"bad": failure}) as rig, rig.pressed().subscriber() as subscriber:
+        rig.switch('\n[controller]\nlaw = "mylab.bad"\n')
+        assert codes(events_until(subscriber, code)) == [code]
+        assert subscriber.until("hapticd/status", latched=True, armed=False)
+        _, summary = rig.recorded(code)
+        record_property("ticks_until_released", summary.ramp_ticks)
+        record_property("peak_force_n", summary.peak_force_n)
+        assert summary.ramp_ticks is not None
+        assert summary.ramp_ticks <= most_ticks
+        assert summary.peak_force_n <= LIMIT_N
+        rig.switch()
+        rig.goes_on("clear", "arm")
+
+
+LOST = ("unplugged", "oserror", "no-write", "garbage", "hang-close")
+
+
+def test_a_lost_device_is_without_force_and_comes_back_disarmed(record_property: Report) -> None:
+    """All at once, since a device is looked for from one second on."""
+    with contextlib.ExitStack() as stack:
+        rigs = {order: stack.enter_context(Rig()) for order in LOST}
+        subscribers = {order: stack.enter_context(rig.pressed().subscriber()) for order, rig in rigs.items()}
+        for order, rig in rigs.items():
+            rig.order(order)
+        for order, rig in rigs.items():
+            events = events_until(subscribers[order], EventCode.DEVICE_LOST)
+            assert codes(events) == [EventCode.DEVICE_LOST], order
+            felt = rig.released()
+            record_property(order, felt)
+            assert felt.writes <= 1, order
+            assert felt.peak_n <= LIMIT_N
+            status = subscribers[order].until("hapticd/status", armed=False)
+            assert status["next_try_timestamp"] > status["device_lost_timestamp"] > 0.0
+            assert not status["latched"]
+            assert "no device" in status["warnings"][0]
+            refused = rig.ask("arm")
+            assert not refused["ok"]
+            assert "no device" in refused["text"]
+        for rig in rigs.values():
+            rig.mend()
+        for order, rig in rigs.items():
+            found = subscribers[order].until("hapticd/event", code=EventCode.DEVICE_FOUND)
+            last = -1
+            for topic, fields in subscribers[order].maps():
+                if topic == "hapticd/position":
+                    assert last == -1 or fields["seq"] == last + 1
+                    assert fields["force_n"] == [0.0], "a real device waits to be armed"
+                    assert fields["seq"] > found["seq"]
+                    last = fields["seq"]
+                    if last > found["seq"] + 300:
+                        break
+            status = subscribers[order].until("hapticd/status")
+            assert (status["device_lost_timestamp"], status["armed"]) == (0.0, False)
+            rig.goes_on("arm")
+            record, summary = rig.recorded(EventCode.DEVICE_LOST)
+            assert (record.ticks[-1].seq, summary.after_s) == (found["seq"], 0.0)
+
+
+def test_the_device_arms_itself_again_only_where_it_did_so_before_and_nobody_objects() -> None:
+    with Rig(safety="auto_arm = true") as rig, rig.subscriber() as subscriber:
+        pressing(rig.daemon)
+        rig.order("unplugged")
+        events_until(subscriber, EventCode.DEVICE_LOST)
+        rig.mend()
+        events_until(subscriber, EventCode.DEVICE_FOUND)
+        assert subscriber.until("hapticd/status", device_lost_timestamp=0.0, armed=True)
+        pressing(rig.daemon)
+        rig.order("jump")
+        events_until(subscriber, EventCode.OVER_SPEED)
+        rig.order("unplugged")
+        events_until(subscriber, EventCode.DEVICE_LOST)
+        rig.mend()
+        events_until(subscriber, EventCode.DEVICE_FOUND)
+        status = subscriber.until("hapticd/status", device_lost_timestamp=0.0)
+        assert (status["armed"], status["latched"]) == (False, True), "pulling the plug clears no fault"
+        assert not rig.ask("arm")["ok"]
+        rig.goes_on("clear", "arm")
+
+
+def test_while_the_device_is_gone_commands_and_files_are_taken_for_its_return() -> None:
+    with Rig(safety="auto_arm = true") as rig, rig.subscriber() as subscriber:
+        pressing(rig.daemon)
+        rig.order("unplugged")
+        events_until(subscriber, EventCode.DEVICE_LOST)
+        assert rig.ask("disarm")["ok"]
+        rig.switch('\n[controller]\nlaw = "tdpa"\n')
+        rig.order("swapped")
+        wait_until(
+            lambda: "restart hapticd to use it" in str(subscriber.until("hapticd/status")["warnings"]), "a refusal"
+        )
+        rig.mend()
+        events_until(subscriber, EventCode.DEVICE_FOUND)
+        status = subscriber.until("hapticd/status", device_lost_timestamp=0.0)
+        assert (status["armed"], status["law"], status["law_index"]) == (False, "tdpa", 1)
+        rig.goes_on("arm")
+        rig.order("unplugged")
+        events_until(subscriber, EventCode.DEVICE_LOST)
+        rig.daemon.process.send_signal(signal.SIGTERM)
+        assert rig.daemon.wait_exit() == 0
+        assert nothing_left(rig.daemon)
+
+
+def test_a_fault_of_the_devices_own_is_latched_and_the_device_opened_anew(record_property: Report) -> None:
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        rig.order("fault")
+        events = events_until(subscriber, EventCode.DEVICE_FAULT)
+        assert codes(events) == [EventCode.DEVICE_FAULT]
+        assert "too hot" in str(events[-1]["text"])
+        felt = rig.released()
+        keep(record_property, felt)
+        assert felt.writes == 0
+        rig.mend()
+        events_until(subscriber, EventCode.DEVICE_FOUND)
+        assert subscriber.until("hapticd/status", device_lost_timestamp=0.0)["latched"]
+        assert not rig.ask("arm")["ok"]
+        rig.goes_on("clear", "arm")
+
+
+def test_a_device_that_hangs_is_released_from_outside_and_the_service_ends(record_property: Report) -> None:
+    with contextlib.ExitStack() as stack:
+        rigs = {order: stack.enter_context(Rig()) for order in ("hang-read", "hang-write")}
+        subscribers = {order: stack.enter_context(rig.pressed().subscriber()) for order, rig in rigs.items()}
+        for order, rig in rigs.items():
+            rig.order(order)
+            events = events_until(subscribers[order], EventCode.CONTROL_LOST)
+            assert codes(events) == [EventCode.CONTROL_LOST]
+            felt = rig.released()
+            record_property(order, felt)
+            assert (felt.writes, felt.force_n, felt.opened) == (0, 0.0, 1)
+            assert rig.daemon.wait_exit() == 1
+            assert nothing_left(rig.daemon)
+            record, summary = rig.recorded(EventCode.CONTROL_LOST)
+            assert (summary.after_s, summary.ticks) == (0.0, len(record.ticks))
+            assert summary.ticks > 500
+
+
+def test_a_supervisor_that_stalls_takes_the_force_out_and_says_what_it_missed(record_property: Report) -> None:
+    with Rig(safety="supervisor_stall_s = 0.3") as rig, rig.pressed().subscriber() as subscriber:
+        memory = rig.daemon.memory()
+        rig.daemon.process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: all_records(memory)[-1].flags & 8, "the fault")
+        records = all_records(memory)
+        at = next(index for index, record in enumerate(records) if not record.flags & 1)
+        wait_until(lambda: all_records(memory)[-1].seq > records[at].seq + RAMP, "the ramp")
+        ramp = [abs(record.force_n[0]) for record in all_records(memory) if record.seq >= records[at].seq]
+        record_property("ticks_until_released", ramp.index(0.0))
+        record_property("peak_force_n", max(ramp))
+        assert ramp.index(0.0) <= RAMP
+        settle(8.0)  # more than the ring holds
+        rig.daemon.process.send_signal(signal.SIGCONT)
+        events = events_until(subscriber, EventCode.RING_DROPPED)
+        assert codes([*events, *events_until(subscriber, EventCode.SUPERVISOR_STALLED)]) == [
+            EventCode.RING_DROPPED,
+            EventCode.SUPERVISOR_STALLED,
+        ]
+        rig.recorded(EventCode.SUPERVISOR_STALLED)
+        memory.close()
+        rig.goes_on("clear", "arm")
+
+
+def test_a_burst_of_missed_deadlines_is_a_warning_and_one_event(record_property: Report) -> None:
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        rig.order("slow 20")
+        event = subscriber.until("hapticd/event", code=EventCode.OVERRUN_BURST)
+        record_property("skipped", event["skipped"])
+        assert 10 <= event["skipped"] < 50
+        rig.mend()
+        assert subscriber.until("hapticd/status", armed=True)["fault_code"] == 0
+        assert not (rig.daemon.directory / "state").exists(), "a warning is no fault to keep a record of"
+
+
+def test_records_reach_back_five_seconds_and_the_oldest_goes_first() -> None:
+    with Rig(more="[faults]\nkeep = 2") as rig, rig.pressed().subscriber() as subscriber:
+        for topic, fields in subscriber.maps():
+            if topic == "hapticd/position" and fields["seq"] > 5500:
+                break
+        names = []
+        for _ in range(3):
+            rig.order("jump")
+            subscriber.until("hapticd/event", code=EventCode.OVER_SPEED)
+            wanted = len(names) + 1
+            wait_until(lambda wanted=wanted: subscriber.until("hapticd/status")["fault_records"] == wanted, "a record")
+            record, summary = rig.recorded(EventCode.OVER_SPEED)
+            names.append(record.name)
+            assert summary.before_s == pytest.approx(5.0, abs=0.1)
+            assert summary.after_s == pytest.approx(1.0, abs=0.1)
+            rig.mend()
+            rig.goes_on("clear", "arm")
+        kept = FaultStore(rig.daemon.directory / "state" / "default" / "faults").paths()
+        assert [path.stem for path in kept] == names[:0:-1]
+        listed = rig.hapticd("fault", "list").stdout.splitlines()
+        assert [line.split()[0] for line in listed] == names[:0:-1]
+        assert record.header["config"]["text"] == rig.config
+        assert subscriber.until("hapticd/status")["ring_drops"] == 0, "writing records cost the drain nothing"
+
+
+@pytest.mark.skipif(os.geteuid() != 0 or shutil.which("unshare") is None, reason="needs root and util-linux's unshare")
+def test_a_full_disk_costs_the_record_and_nothing_else() -> None:
+    mount = 'mkdir -p "$HAPTICD_STATE_DIR" && mount -t tmpfs -o size=64k tmpfs "$HAPTICD_STATE_DIR" && exec "$@"'
+    with Rig(prefix=("unshare", "--mount", "sh", "-c", mount, "sh")) as rig, rig.pressed().subscriber() as subscriber:
+        for topic, fields in subscriber.maps():
+            if topic == "hapticd/position" and fields["seq"] > 3000:
+                break
+        rig.order("jump")
+        events_until(subscriber, EventCode.OVER_SPEED)
+        event = subscriber.until("hapticd/event", code=EventCode.FAULT_RECORD_FAILED)
+        assert "No space left on device" in event["text"]
+        inside = Path(f"/proc/{rig.daemon.process.pid}/root{rig.daemon.directory}/state/default/faults")
+        assert list(inside.iterdir()) == [], "half a record is none"
+        rig.mend()
+        rig.goes_on("clear", "arm")
+        assert subscriber.until("hapticd/status")["ring_drops"] == 0
+
+
+def test_a_flood_of_subscriptions_costs_no_tick_and_is_told_once(record_property: Report) -> None:
+    with Rig() as rig, rig.pressed().subscriber("hapticd/position", "hapticd/event") as observer:
+        context = zmq.Context()
+        flood = [context.socket(zmq.SUB) for _ in range(20)]
+        for socket in flood:
+            socket.setsockopt(zmq.RCVHWM, 10)
+            socket.connect(rig.daemon.endpoint)
+        end_s = time.monotonic() + 3.0
+        while time.monotonic() < end_s:
+            for socket in flood:
+                for _ in range(10):
+                    socket.setsockopt(zmq.SUBSCRIBE, b"hapticd/status")
+                    socket.setsockopt(zmq.UNSUBSCRIBE, b"hapticd/status")
+        for socket in flood:
+            socket.close(0)
+        context.term()
+        told = []
+        last = -1
+        until = rig_seq(rig) + 500
+        for topic, fields in observer.maps():
+            if topic == "hapticd/event":
+                told.append(fields)
+            else:
+                assert last in (-1, fields["seq"] - 1), "a flood of others costs this subscriber nothing"
+                last = fields["seq"]
+                if last > until:
+                    break
+        record_property("subscriptions", [event.get("subscriptions") for event in told])
+        assert [event["code"] for event in told] == [EventCode.SUBSCRIBER_FLOOD]
+        with rig.subscriber("hapticd/status") as subscriber:
+            status = subscriber.until("hapticd/status")
+        assert (status["ring_drops"], status["armed"], status["overruns"] < 100) == (0, True, True)
+
+
+def rig_seq(rig: Rig) -> int:
+    with Subscriber(rig.daemon.endpoint, "hapticd/position") as subscriber:
+        return int(next(subscriber.maps())[1]["seq"])
+
+
+def test_a_loop_without_real_time_says_so() -> None:
+    with Rig(more='[loop]\nrealtime = "off"') as rig:
+        assert "not real-time" in rig.daemon.output()

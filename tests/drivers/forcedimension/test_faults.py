@@ -1,0 +1,201 @@
+"""Each thing that can go wrong with a device: how soon it is noticed, what it is called, and that force is off."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import pytest
+
+from hapticd.config.loading import parse
+from hapticd.contracts.driver import DriverState
+from hapticd.contracts.errors import DeviceDisconnectedError, DeviceFaultError, DriverError
+from hapticd.contracts.event import EventCode
+from hapticd.control.process import make_tick
+from hapticd.control.tick import FROZEN_TICKS, ControlTick
+from hapticd.guard import Mode
+from hapticd_drivers.forcedimension.driver import ForceDimension
+from tests.drivers.forcedimension.bench import BRAKE, FORCE, Bench
+
+STATUS_TICKS = 10  # the default of status_every_ticks
+
+
+def pressing(bench: Bench) -> ForceDimension:
+    driver = bench.driver()
+    driver.open()
+    driver.enable()
+    for _ in range(25):
+        driver.read()
+        driver.write([0.0, 0.0, 2.0])
+    assert bench.get("mode") == FORCE
+    return driver
+
+
+def ticks_until_fault(driver: ForceDimension, kind: type[DriverError], text: str) -> int:
+    for tick in range(1000):
+        try:
+            driver.read()
+            driver.write([0.0, 0.0, 2.0])
+        except DriverError as error:
+            assert isinstance(error, kind), error
+            assert text in str(error)
+            return tick + 1
+    raise AssertionError(f"nobody noticed: {text}")
+
+
+def overspeed(bench: Bench) -> None:
+    bench.set(velocity_m_per_s=[6.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("happen", "text"),
+    [
+        (Bench.press_force_button, "the force button on the device was pressed"),
+        (overspeed, "the device's own velocity limit was exceeded"),
+        (lambda bench: bench.advance(11_000), "the device's watchdog heard nothing from this computer in time"),
+        (lambda bench: bench.set(error=3), "the device reports an error of its own (3)"),
+    ],
+)
+def test_a_stop_of_the_device_is_noticed_within_the_status_ticks_and_named(
+    bench: Bench, happen: Callable[[Bench], None], text: str
+) -> None:
+    driver = pressing(bench)
+    happen(bench)
+    assert ticks_until_fault(driver, DeviceFaultError, text) <= STATUS_TICKS + 1
+    driver.disable()
+    assert bench.get("mode") == BRAKE
+    assert bench.vector("force_n") == [0.0, 0.0, 0.0]
+    # It is still there: positions go on, and forces come back only when somebody enables them again.
+    bench.set(error=0, velocity_m_per_s=[0.0, 0.0, 0.0])
+    for _ in range(3 * STATUS_TICKS):
+        driver.read()
+    assert bench.get("mode") == BRAKE
+    driver.enable()
+    for _ in range(3 * STATUS_TICKS):
+        driver.read()
+        driver.write([0.0, 0.0, 1.0])
+    driver.close()
+
+
+def test_the_watchdog_takes_the_force_away_while_nobody_calls(bench: Bench) -> None:
+    driver = pressing(bench)
+    bench.advance(9_000)
+    assert bench.get("mode") == FORCE
+    bench.advance(1_200)
+    assert (bench.get("mode"), bench.get("cause")) == (BRAKE, 3)
+    assert bench.vector("force_n") == [0.0, 0.0, 0.0]
+    driver.close()
+
+
+@pytest.mark.parametrize("first", ["read", "write"])
+def test_an_unplugged_device_is_noticed_by_the_next_call(bench: Bench, first: str) -> None:
+    driver = pressing(bench)
+    bench.set(present=0)
+    call = driver.read if first == "read" else lambda: driver.write([0.0, 0.0, 0.0])
+    with pytest.raises(DeviceDisconnectedError, match=r"communication error, error 2 \(COM\)"):
+        call()
+    driver.disable()
+    driver.disable()
+    driver.close()
+    assert driver.state is DriverState.CLOSED
+    bench.set(present=1)
+    driver.open()
+    driver.read()
+    assert bench.get("mode") != FORCE
+    driver.close()
+
+
+def test_a_device_that_lost_its_calibration_while_it_was_away_takes_no_force(bench: Bench) -> None:
+    driver = pressing(bench)
+    bench.set(present=0)
+    with pytest.raises(DeviceDisconnectedError):
+        driver.read()
+    driver.close()
+    bench.set(present=1, calibrated=0)
+    driver.open()
+    with pytest.raises(DriverError, match="not been calibrated"):
+        driver.enable()
+    driver.close()
+
+
+CONFIG = """
+[device]
+driver = "omega7"
+[[scene.walls]]
+stiffness_n_per_m = 2000.0
+[safety]
+auto_arm = true
+"""
+
+
+def armed(bench: Bench) -> tuple[ForceDimension, ControlTick]:
+    bench.set(hand_n=[0.0, 0.0, -2.0], viscous_n_s_per_m=20)
+    driver = bench.driver()
+    tick = make_tick(parse(CONFIG, "test"), driver.open())
+    tick.start(driver.read())
+    driver.enable()
+    tick.arm()
+    for _ in range(300):
+        driver.write(tick.step(driver.read(), 1e-3))
+    assert bench.get("force_n", index=2) == pytest.approx(2.0, abs=0.1)
+    return driver, tick
+
+
+def ticks_until_code(driver: ForceDimension, tick: ControlTick, code: EventCode) -> int:
+    for count in range(1, 200):
+        force_n = tick.step(driver.read(), 1e-3)
+        driver.write(force_n)
+        assert all(math.isfinite(newton) for newton in force_n)
+        if tick.fault:
+            assert tick.fault == code
+            return count
+    raise AssertionError(f"no {code}")
+
+
+def until_disarmed(driver: ForceDimension, tick: ControlTick) -> int:
+    for count in range(1, 200):
+        driver.write(tick.step(driver.read(), 1e-3))
+        if tick.guard.mode is Mode.DISARMED:
+            return count
+    raise AssertionError("still armed")
+
+
+def test_data_that_is_never_new_is_a_frozen_device(bench: Bench) -> None:
+    driver, tick = armed(bench)
+    bench.set(stale=1)
+    assert ticks_until_code(driver, tick, EventCode.DEVICE_FROZEN) == FROZEN_TICKS
+    assert until_disarmed(driver, tick) <= 51
+    assert bench.vector("force_n") == [0.0, 0.0, 0.0]
+    driver.close()
+
+
+@pytest.mark.parametrize("garbage", [1, 2])
+def test_garbage_is_an_impossible_sample_and_the_force_is_out_within_10_ms(bench: Bench, garbage: int) -> None:
+    driver, tick = armed(bench)
+    bench.set(garbage=garbage)
+    assert ticks_until_code(driver, tick, EventCode.SAMPLE_IMPOSSIBLE) == 1
+    assert until_disarmed(driver, tick) <= 10
+    assert bench.vector("force_n") == [0.0, 0.0, 0.0]
+    driver.close()
+
+
+def test_a_slow_call_is_waited_for_and_changes_nothing_else(bench: Bench) -> None:
+    driver = pressing(bench)
+    bench.set(slow_us=30_000, slow_calls=1)
+    before_s = time.monotonic()
+    driver.read()
+    assert time.monotonic() - before_s >= 0.03
+    driver.write([0.0, 0.0, 2.0])
+    assert bench.get("force_n", index=2) == 2.0
+    driver.close()
+
+
+def test_a_device_that_repeats_one_position_as_new_cannot_be_told_from_one_that_stands_still(bench: Bench) -> None:
+    """The SDK has no count and no clock of the device: docs/omega7.md says so."""
+    driver, tick = armed(bench)
+    bench.set(frozen=1)
+    for _ in range(2 * FROZEN_TICKS):
+        driver.write(tick.step(driver.read(), 1e-3))
+    assert tick.fault == 0
+    driver.close()
