@@ -13,7 +13,7 @@ from hapticd.installation import Installation, systemd_runs, unit_states
 
 app = typer.Typer(
     help="Install the daemon as a service, look at it, remove it.",
-    epilog="Example: sudo hapticd service install",
+    epilog="Example: hapticd service install",
     rich_markup_mode=None,
 )
 
@@ -29,18 +29,18 @@ def install(
 ) -> None:
     """Install units, user, device rules and a first configuration.
 
-    Nothing is started. A configuration that is there already is kept.
+    Needs root. Nothing is started. A configuration that is there already is kept.
 
-    Example: sudo hapticd service install
+    Example: hapticd service install
     """
     Installation(root, executable).install(typer.echo)
 
 
 @app.command()
 def uninstall(root: Root = Path("/")) -> None:
-    """Stop the service and remove it; configurations and fault records stay.
+    """Stop the service and remove it, as root; configurations and fault records stay.
 
-    Example: sudo hapticd service uninstall
+    Example: hapticd service uninstall
     """
     Installation(root).uninstall(typer.echo)
 

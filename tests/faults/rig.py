@@ -94,7 +94,10 @@ class Rig:
             [device.options]
             order = "{self._order}"
             witness = "{self._witness}"
-            hand = {{ force = {{ profile = "constant", newton = -3.0 }}, stiffness_n_per_m = 2000.0, damping_n_s_per_m = 5.0 }}
+            [device.options.hand]
+            force = {{ profile = "constant", newton = -3.0 }}
+            stiffness_n_per_m = 2000.0
+            damping_n_s_per_m = 5.0
             [[scene.walls]]
             stiffness_n_per_m = 12000.0
             [safety]
@@ -147,7 +150,8 @@ class Rig:
             "HAPTICD_STATE_DIR": str(self.daemon.directory / "state"),
             "PYTHONPATH": str(self.directory),
         }
-        return subprocess.run([HAPTICD, *arguments], env=environment, capture_output=True, text=True, timeout=60)
+        command = [HAPTICD, *arguments]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
 
     def order(self, text: str) -> None:
         """Let the device fail from the next tick on."""
@@ -194,14 +198,11 @@ class Rig:
 def events_until(subscriber: Subscriber, code: EventCode) -> list[dict[str, Any]]:
     """Every event up to one of this code."""
     seen = []
-    for topic, fields in subscriber.maps(PATIENCE_S):
+    end_s = time.monotonic() + PATIENCE_S
+    for topic, fields in subscriber.maps():
+        assert time.monotonic() < end_s, f"no event {code} after {[event['text'] for event in seen]}"
         if topic == "hapticd/event":
             seen.append(fields)
             if fields["code"] == code:
                 return seen
     raise AssertionError(f"no event {code} after {[event['text'] for event in seen]}")
-
-
-def settle(seconds: float) -> None:
-    """Leave time for what must not happen."""
-    time.sleep(seconds)

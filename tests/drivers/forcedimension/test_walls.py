@@ -127,9 +127,17 @@ class Lab:
         file: the device's memory.
         stiffness_n_per_m: wall.
         rate_hz: of the loop.
+        law: what stabilises the wall.
     """
 
-    def __init__(self, fake_sdk: Path, file: Path, stiffness_n_per_m: float, rate_hz: float = 1000.0) -> None:
+    def __init__(
+        self,
+        fake_sdk: Path,
+        file: Path,
+        stiffness_n_per_m: float,
+        rate_hz: float = 1000.0,
+        law: str = "energy-cycle",
+    ) -> None:
         self.file = file
         self.stiffness_n_per_m = stiffness_n_per_m
         self.rate_hz = rate_hz
@@ -138,7 +146,7 @@ class Lab:
         self.bench.set(-1, wall_scale=SLOW)
         os.environ["FAKE_DHD_FILE"] = str(file)
         try:
-            self.daemon = Daemon(config(self.bench, stiffness_n_per_m, rate_hz=rate_hz))
+            self.daemon = Daemon(config(self.bench, stiffness_n_per_m, law, rate_hz))
         finally:
             del os.environ["FAKE_DHD_FILE"]
 
@@ -172,10 +180,12 @@ def windows_held(subscriber: Subscriber, lab: Lab, from_s: float, seconds: float
 
 
 def walls_in_the_daemon(fake_sdk: Path, directory: Path, rate_hz: float, seconds: float) -> list[float]:
+    """How well the three walls held in their last two seconds, and how well the first one does without a law."""
+    walls = [("energy-cycle", 12000.0), ("energy-cycle", 18000.0), ("energy-cycle", 20000.0), ("none", 12000.0)]
     with contextlib.ExitStack() as stack:
         labs = [
-            stack.enter_context(Lab(fake_sdk, directory / f"device-{stiffness}", stiffness, rate_hz))
-            for stiffness in (12000.0, 18000.0, 20000.0)
+            stack.enter_context(Lab(fake_sdk, directory / f"device-{number}", stiffness, rate_hz, law))
+            for number, (law, stiffness) in enumerate(walls)
         ]
         subscribers = [stack.enter_context(Subscriber(lab.daemon.endpoint, "hapticd/position")) for lab in labs]
         return [
@@ -185,16 +195,17 @@ def walls_in_the_daemon(fake_sdk: Path, directory: Path, rate_hz: float, seconds
 
 @pytest.mark.usefixtures("bench")
 def test_the_daemon_holds_the_papers_walls_on_the_device(fake_sdk: Path, tmp_path: Path) -> None:
-    shares = walls_in_the_daemon(fake_sdk, tmp_path, 1000.0, 5.0)
-    assert min(shares) >= 0.75, shares
+    *held, without_law = walls_in_the_daemon(fake_sdk, tmp_path, 1000.0, 5.0)
+    assert min(held) >= 0.75, held
+    assert without_law <= 0.25
 
 
 @pytest.mark.nightly
 @pytest.mark.usefixtures("bench")
 @pytest.mark.parametrize("rate_hz", [1000.0, 4000.0])
 def test_the_daemon_holds_the_papers_walls_for_long(fake_sdk: Path, tmp_path: Path, rate_hz: float) -> None:
-    shares = walls_in_the_daemon(fake_sdk, tmp_path, rate_hz, 30.0)
-    assert min(shares) >= 0.75, shares
+    *held, _ = walls_in_the_daemon(fake_sdk, tmp_path, rate_hz, 30.0)
+    assert min(held) >= 0.75, held
 
 
 @pytest.fixture
@@ -216,10 +227,8 @@ def test_when_the_computer_goes_silent_the_device_brakes_by_itself(lab: Lab) -> 
 
 
 def test_when_the_loop_is_killed_the_supervisor_takes_the_force_away(lab: Lab) -> None:
-    with Subscriber(lab.daemon.endpoint, "hapticd/event") as subscriber:
-        os.kill(lab.daemon.control_pid(), signal.SIGKILL)
-        assert lab.daemon.wait_exit() == 1
-        assert subscriber is not None
+    os.kill(lab.daemon.control_pid(), signal.SIGKILL)
+    assert lab.daemon.wait_exit() == 1
     assert lab.look().get("mode") == BRAKE
     assert lab.look().get("cause") == SOFTWARE
     assert lab.look().get("holder") == 0

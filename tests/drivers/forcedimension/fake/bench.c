@@ -2,7 +2,6 @@
 #include "fake.h"
 
 #include <fcntl.h>
-#include <signal.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,6 +47,9 @@ static void make(struct bench *made) {
 /* Plug this process into a bench: the one in a file, made if it is new, or for NULL a new one of its own. */
 int fake_attach(const char *file) {
     static struct bench own;
+    if (bench && bench != &own)
+        munmap(bench, sizeof *bench);
+    bench = NULL;
     memset(open_here, 0, sizeof open_here);
     logged_count = 0;
     if (!file) {
