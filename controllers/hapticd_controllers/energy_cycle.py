@@ -28,6 +28,7 @@ CAP_FELT_MASS, CAP_KNOWN_MASS, CAP_FIXED, CAP_NONE = range(4)
 LIMIT = 1e12  # nothing that is summed or returned grows beyond this, in SI units: so nothing overflows
 TINY_MOTION = 1e-24  # a cycle with less sum of v^2 dt [m^2/s] is rest: there is nothing to divide by
 FELT_SAMPLES = 20.0  # effective samples before an identified mass is believed
+LEAST_PUSH = 0.005  # negative friction beyond this share of mass / dt is a force one sample late, not an active device
 FELT_COUNTS = 2.0  # a shorter move, in counts of the position, says more about the quantiser than about the mass
 
 
@@ -325,7 +326,9 @@ def _believe(state: Any, params: Any) -> None:
         covariance -= us * sw / variance_s
         late_variance -= late_us * late_us / variance_s
         late_covariance -= late_us * sw / variance_s
-        braked = sw * variance <= us * covariance  # b >= 0 in the plane without delay
+        # b >= 0 in the plane without delay, or so little below that an active device or rounding explains it
+        pushed = sw * variance - us * covariance
+        braked = pushed * state.period_s <= LEAST_PUSH * variance * variance_s
     explained = 0.0
     late_explained = 0.0
     if variance > 0.0 and covariance > 0.0:

@@ -119,7 +119,8 @@ static inline void believe(law_state *s, const law_params *p) {
         covariance -= us * sw / variance_s;
         late_variance -= late_us * late_us / variance_s;
         late_covariance -= late_us * sw / variance_s;
-        braked = sw * variance <= us * covariance;
+        double pushed = sw * variance - us * covariance;
+        braked = pushed * s->period_s <= 0.005 * variance * variance_s;
     }
     double explained = 0.0;
     double late_explained = 0.0;

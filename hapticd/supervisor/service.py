@@ -133,13 +133,10 @@ class Service:
         now_s = time.monotonic()
         self.control.beat()
         self._publish()
-        if self._device_lost is not None and self.report.last is not None and not self._stopping:
-            self._begin_recovery(self._device_lost)
         self._obey()
         if self.recovery.lost:
             self._look_for_device()
         else:
-            self.requests.turn()
             self._look_after_loop(now_s)
         self.chronicle.turn(self.config, self.control)
         if (now_s >= self._status_due_s or self.chronicle.news) and self.exit_code is None:
@@ -173,7 +170,13 @@ class Service:
         return len(records)
 
     def _look_after_loop(self, now_s: float) -> None:
-        if self.control.exit_code is not None:
+        ended = self.control.exit_code is not None
+        while ended and self._publish():
+            pass
+        self.requests.turn()
+        if self._device_lost is not None and self.report.last is not None and not self._stopping:
+            self._begin_recovery(self._device_lost)
+        elif ended:
             self._control_ended()
         elif self.control.stalled():
             self._control_lost(f"the control loop stood still for more than {self.control.stall_s:g} s")
@@ -221,8 +224,6 @@ class Service:
         self.control.stop()
 
     def _control_ended(self) -> None:
-        while self._publish():
-            pass
         self.chronicle.recorder.loop_ended()
         code = self.control.exit_code
         if self._stopping and (code == 0 or self._device_lost is not None):

@@ -69,13 +69,20 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
 
     Raises:
         ConfigError: the instance's name is none that a directory could have.
+        InstanceError: the daemon's directory is not open to this user.
     """
     given = _given(instance)
     if given is not None:
         return given / name
+    closed = None
     for directory in (_SYSTEM / instance, _user(instance)):
-        if (directory / name).exists():
-            return directory / name
+        try:
+            if (directory / name).exists():
+                return directory / name
+        except PermissionError:
+            closed = directory
+    if closed is not None:
+        raise InstanceError(f"{closed}: not open to you: sudo usermod -aG hapticd $USER, then log in again")
     return runtime_directory(instance) / name
 
 

@@ -280,6 +280,7 @@ class Publisher:
             raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
         self._bind(f"ipc://{path}")
         self._ipc_path = path
+        path.chmod(0o660)
 
     def _bind(self, endpoint: str) -> None:
         try:

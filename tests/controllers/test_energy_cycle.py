@@ -112,6 +112,17 @@ def test_the_first_cycle_finds_the_leak_of_a_sampled_spring(stiffness_n_per_m: f
     assert found == pytest.approx(stiffness_n_per_m * period_s / 2.0, rel=0.03)
 
 
+@pytest.mark.parametrize("viscous_n_s_per_m", [0.0, -1.0])
+def test_a_device_without_friction_is_not_taken_for_a_late_one(viscous_n_s_per_m: float) -> None:
+    """At zero friction its sign is rounding, and the paper's active device has a little less than none."""
+    rig = Rig(energy_cycle, replace(PAPER, viscous_n_s_per_m=viscous_n_s_per_m))
+    rig.run(3.0)
+    assert not rig.state.forces_late
+    assert rig.state.felt_mass_kg == pytest.approx(PAPER.mass_kg, rel=0.01)
+    if viscous_n_s_per_m == 0.0:
+        assert rig.state.damping_n_s_per_m == pytest.approx(5.6, abs=0.2)
+
+
 @pytest.mark.parametrize("mass_kg", [0.1, 0.25, 0.5, 1.0])
 @pytest.mark.parametrize("delay_samples", [0, 1])
 def test_mass_and_delay_are_felt(mass_kg: float, delay_samples: int) -> None:

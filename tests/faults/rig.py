@@ -121,7 +121,10 @@ class Rig:
         return self
 
     def subscriber(self, *topics: str) -> Subscriber:
-        return Subscriber(self.daemon.endpoint, *topics)
+        """A subscriber that the daemon knows of, so that it misses nothing from now on."""
+        subscriber = Subscriber(self.daemon.endpoint, *topics)
+        next(subscriber.maps())
+        return subscriber
 
     def ask(self, do: str, **fields: bool) -> dict[str, Any]:
         """The daemon's answer to a request."""

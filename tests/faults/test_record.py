@@ -24,6 +24,7 @@ from hapticd.faults.receipt import receipt
 from hapticd.faults.store import FaultStore
 from hapticd.faults.summary import summarise
 from hapticd.supervisor.recorder import FaultRecorder
+from tests.daemon.running import wait_until
 
 RATE_HZ = 1000.0
 LAYOUT = RecordLayout(2, True, 8)
@@ -58,7 +59,11 @@ def path(tmp_path: Path) -> Path:
 
 def test_a_record_says_what_happened_to_what_under_which_configuration(path: Path) -> None:
     said = read_header(path)
-    assert (said["event"]["code"], said["event"]["name"], said["event"]["fields"]) == (202, "OVER_SPEED", {"speed": 3.0})
+    assert (said["event"]["code"], said["event"]["name"], said["event"]["fields"]) == (
+        202,
+        "OVER_SPEED",
+        {"speed": 3.0},
+    )
     assert said["config"]["text"] == "[loop]\nrate_hz = 1000.0\n"
     assert (said["device"]["max_force_n"], said["ticks"]["count"]) == (None, 24)
     for key in ("kernel", "version", "machine", "python", "law", "driver"):
@@ -73,17 +78,12 @@ def test_ticks_come_back_as_they_were(path: Path) -> None:
     assert (figures.before_s, figures.after_s) == (pytest.approx(0.02), pytest.approx(0.003))
 
 
-def test_a_csv_has_every_field_of_every_tick_and_wall() -> None:
-    rows = [row(0, 1.0, walls=1), row(1, 1.0, walls=2)]
-    directory_free = io.StringIO()
-    store = encode(header(), LAYOUT, iter(rows), 8)
-    file = Path("/dev/shm") / "hapticd-test-record"
-    try:
-        file.write_bytes(store)
-        write_csv(read(file), directory_free)
-    finally:
-        file.unlink()
-    table = list(csv.DictReader(io.StringIO(directory_free.getvalue())))
+def test_a_csv_has_every_field_of_every_tick_and_wall(tmp_path: Path) -> None:
+    file = tmp_path / "x.fault"
+    file.write_bytes(encode(header(), LAYOUT, iter([row(0, 1.0, walls=1), row(1, 1.0, walls=2)]), 8))
+    written = io.StringIO()
+    write_csv(read(file), written)
+    table = list(csv.DictReader(io.StringIO(written.getvalue())))
     assert [line["t_s"] for line in table] == ["-0.020000", "-0.019000"]
     assert (table[0]["force_n[0]"], table[0]["orientation[8]"], table[0]["buttons"]) == ("1.0", "8.0", "3")
     assert (table[0]["damping_n_s_per_m[1]"], table[1]["damping_n_s_per_m[1]"]) == ("", "9.5")
@@ -92,12 +92,21 @@ def test_a_csv_has_every_field_of_every_tick_and_wall() -> None:
 
 @pytest.mark.parametrize(
     "damaged",
-    [b"", b"hello", MAGIC, MAGIC + b"{", MAGIC + b"{}\n", content()[:-20], content().replace(b"<qq", b"<qQ"), b"\xff" * 500],
+    [
+        b"",
+        b"hello",
+        MAGIC,
+        MAGIC + b"{",
+        MAGIC + b"{}\n",
+        content()[:-20],
+        content().replace(b"<qq", b"<qQ"),
+        b"\xff" * 500,
+    ],
 )
 def test_a_damaged_record_is_named_in_one_line(tmp_path: Path, damaged: bytes) -> None:
     file = tmp_path / "x.fault"
     file.write_bytes(damaged)
-    with pytest.raises(HapticdError, match="x.fault") as raised:
+    with pytest.raises(HapticdError, match=r"x\.fault") as raised:
         read(file)
     assert "\n" not in str(raised.value)
 
@@ -113,51 +122,117 @@ def test_the_oldest_record_makes_room_and_no_half_record_stays(tmp_path: Path) -
     assert {path.suffix for path in store.directory.iterdir()} == {".fault"}
 
 
-class Ring:
-    """A loop's memory, filled by hand."""
-
-    def __init__(self) -> None:
-        self.shared = SharedMemory(LAYOUT, RATE_HZ)
-
-    def write(self, count: int, first_seq: int = 0) -> None:
-        written = self.shared.words[RECORDS]
-        for number in range(written, written + count):
-            start = number % self.shared.slots * LAYOUT.size
-            self.shared.record_area[start : start + LAYOUT.size] = row(first_seq + number, 1.0)
-        self.shared.words[RECORDS] = written + count
-
-
-def recorded(ring: Ring, seq: int, directory: Path, after: int) -> list[int]:
-    """Numbers of the ticks in a record of a fault at this tick, when the loop goes on for so many."""
-    recorder = FaultRecorder(directory)
-    event = Event(EventCode.OVER_SPEED, "too fast", seq, seq * 1_000_000)
-    recorder.begin(event, 1e9, ring.shared, RATE_HZ, header())
-    assert recorder.turn(5) == ""
-    assert FaultStore(directory).paths() == [], "it waits for the ticks after the fault"
-    ring.write(after, ring.first)
-    assert recorder.close(5, 10.0) == ""
-    assert recorder.written == 1
-    (path,) = FaultStore(directory).paths()
-    return [tick.seq for tick in read(path).ticks]
+def extend(shared: SharedMemory, count: int, first_seq: int) -> None:
+    """Let a loop that began with this tick write so many records more."""
+    written = shared.words[RECORDS]
+    for number in range(written, written + count):
+        start = number % shared.slots * LAYOUT.size
+        shared.record_area[start : start + LAYOUT.size] = row(first_seq + number, 1.0)
+    shared.words[RECORDS] = written + count
 
 
 @pytest.mark.parametrize(
-    ("before", "first_seq", "seq", "after", "first", "last"),
+    ("before", "first_seq", "seq", "after", "held"),
     [
-        (7000, 0, 6990, 1500, 1990, 7990),  # all of it
-        (300, 0, 290, 1500, 0, 1290),  # just started
-        (7000, 0, 6999, 0, 1999, 6999),  # the loop ended with it
-        (100, 5000, 5090, 1500, 5000, 6090),  # a loop that goes on for one before it
-        (9000, 0, 1500, 0, 1002, 2500),  # the supervisor slept: what the ring still has
-        (20000, 0, 1500, 0, None, None),  # nothing of it
+        (7000, 0, 6990, 1500, range(1990, 7991)),  # all of it
+        (300, 0, 290, 1500, range(1291)),  # the loop had just started
+        (7000, 0, 6999, 0, range(1999, 7000)),  # it ended there
+        (7000, 0, 7000, 0, range(2000, 7000)),  # it ended in that tick
+        (100, 5000, 5090, 1500, range(5000, 6091)),  # it goes on for one before it
+        (9000, 0, 1500, 0, range(1002, 2501)),  # the supervisor slept: what the ring still has
+        (20000, 0, 1500, 0, range(0)),  # nothing of it
+        (0, 0, 0, 0, range(0)),
     ],
 )
 def test_a_record_holds_five_seconds_before_and_one_after_or_what_there_is(
-    tmp_path: Path, before: int, first_seq: int, seq: int, after: int, first: int | None, last: int | None
+    tmp_path: Path, before: int, first_seq: int, seq: int, after: int, held: range
 ) -> None:
-    ring = Ring()
-    ring.write(before, first_seq)
-    ring.first = first_seq
-    seqs = recorded(ring, seq, tmp_path, after) if after or before == 7000 else recorded_late(ring, seq, tmp_path)
-    assert seqs == ([] if first is None or last is None else list(range(first, last + 1)))
-    ring.shared.close()
+    shared = SharedMemory(LAYOUT, RATE_HZ)
+    extend(shared, before, first_seq)
+    recorder = FaultRecorder(tmp_path)
+    recorder.begin(Event(EventCode.OVER_SPEED, "too fast", seq, 0), 1e9, shared, RATE_HZ, header())
+    extend(shared, after, first_seq)
+    shared.close()
+    assert recorder.close(5, 10.0) == ""
+    (path,) = FaultStore(tmp_path).paths()
+    assert [tick.seq for tick in read(path).ticks] == list(held)
+    assert recorder.written == 1
+
+
+def test_a_record_waits_for_the_ticks_after_the_fault(tmp_path: Path) -> None:
+    shared = SharedMemory(LAYOUT, RATE_HZ)
+    extend(shared, 100, 0)
+    recorder = FaultRecorder(tmp_path)
+    recorder.begin(Event(EventCode.OVER_SPEED, "too fast", 50, 0), 1e9, shared, RATE_HZ, header())
+    assert recorder.turn(5) == ""
+    assert list(tmp_path.iterdir()) == []
+    extend(shared, 950, 0)
+    recorder.turn(5)
+    wait_until(lambda: recorder.turn(5) == "" and recorder.written, "the record")
+    shared.close()
+
+
+def test_a_record_that_cannot_be_written_is_a_line_that_says_why(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("a file is in the way")
+    shared = SharedMemory(LAYOUT, RATE_HZ)
+    extend(shared, 100, 0)
+    recorder = FaultRecorder(tmp_path / "state" / "faults")
+    recorder.begin(EVENT, 1e9, shared, RATE_HZ, header())
+    shared.close()
+    problem = recorder.close(5, 10.0)
+    assert str(tmp_path / "state") in problem
+    assert "\n" not in problem
+    assert recorder.written == 0
+
+
+def test_the_command_lists_shows_and_exports(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def hapticd(*arguments: str) -> str:
+        with pytest.raises(SystemExit) as ended:
+            main(["fault", *arguments, "--directory", str(path.parent)])
+        assert ended.value.code == 0
+        return capsys.readouterr().out
+
+    assert hapticd("list") == f"{path.stem}  202 OVER_SPEED  3 m/s is above the limit\n"
+    (listed,) = json.loads(hapticd("list", "--json"))
+    assert (listed["name"], listed["event"]["code"]) == (path.stem, 202)
+    shown = hapticd("show", "014640.000Z-202")
+    assert "202 OVER_SPEED: 3 m/s is above the limit" in shown
+    assert "2 N before, at most 3 N after, gone after 2 ticks" in shown
+    assert "position [mm]" in shown
+    assert json.loads(hapticd("show", "--json"))["summary"]["ramp_ticks"] == 2
+    assert len(hapticd("export").splitlines()) == 25
+    hapticd("export", path.stem, "--output", str(tmp_path / "out.csv"))
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 25
+
+
+def test_a_name_that_fits_no_record_or_several_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (["show"], ["show", "nothing"]):
+        with pytest.raises(SystemExit) as ended:
+            main(["fault", *arguments, "--directory", str(tmp_path)])
+        assert ended.value.code == 1
+        assert str(tmp_path) in capsys.readouterr().err
+    for second in range(2):
+        FaultStore(tmp_path).write(1e9 + second, 202, content(), keep=5)
+    with pytest.raises(SystemExit) as ended:
+        main(["fault", "show", "2001", "--directory", str(tmp_path)])
+    assert ended.value.code == 1
+    assert "any of 20010909T014641.000Z-202, 20010909T014640.000Z-202" in capsys.readouterr().err
+
+
+def test_a_service_keeps_its_records_where_systemd_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HAPTICD_STATE_DIR", "STATE_DIRECTORY", "XDG_STATE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.geteuid", lambda: 1000)
+    monkeypatch.setenv("HOME", "/home/lab")
+    assert fault_directory("left") == Path("/home/lab/.local/state/hapticd/left/faults")
+    monkeypatch.setenv("XDG_STATE_HOME", "/elsewhere")
+    assert fault_directories("left") == [
+        Path("/var/lib/hapticd/left/faults"),
+        Path("/elsewhere/hapticd/left/faults"),
+    ]
+    monkeypatch.setattr("os.geteuid", lambda: 0)
+    assert fault_directory("left") == Path("/var/lib/hapticd/left/faults")
+    monkeypatch.setenv("STATE_DIRECTORY", "/var/lib/hapticd/left")
+    assert fault_directory("left") == Path("/var/lib/hapticd/left/faults")
+    monkeypatch.setenv("HAPTICD_STATE_DIR", str(tmp_path))
+    assert fault_directories("left") == [tmp_path / "left" / "faults"]

@@ -41,7 +41,7 @@ def command(
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)
     from hapticd.study.laws import parse_laws
-    from hapticd.study.robustness.readings import every_reading
+    from hapticd.study.robustness.readings import SHORT, every_reading, short
 
     if only is not None:
         _replay(only, laws, output)
@@ -72,6 +72,8 @@ def command(
         return
     console = Console(highlight=False)
     console.print(found.table())
+    used = [word for word in SHORT if any(word in short(reading.label)[1] for reading in readings)]
+    console.print(*(f"{word}: {SHORT[word]}" for word in used), sep="; ", markup=False, soft_wrap=True)
     console.print()
     for name, group, least, holds in found.bars:
         verdict = "[green]PASS[/]" if holds else "[red]FAIL[/]"

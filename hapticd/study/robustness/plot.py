@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from hapticd.study import style
 from hapticd.study.robustness.devices import WITHIN_REACH
-from hapticd.study.robustness.readings import PAPER
+from hapticd.study.robustness.readings import PAPER, short
 from hapticd.study.robustness.report import Report
 from hapticd.study.robustness.sweep import COLUMNS
 from hapticd.study.verdict import Outcome
@@ -138,6 +138,5 @@ def _settling(panel: Axes, report: Report, table: np.ndarray[Any, Any]) -> None:
 
 def _label(reading: str) -> str:
     """A reading in a few short lines."""
-    name, *values = reading.split(":")
-    text = ", ".join(values) if values and name == PAPER else ", ".join([name, *values])
-    return textwrap.fill(text, 38)
+    name, values = short(reading)
+    return textwrap.fill(values if values and name == PAPER else f"{name}, {values}".removesuffix(", "), 38)

@@ -16,16 +16,35 @@ from hapticd.study.robustness.devices import Device
 PAPER = "energy-cycle"
 
 _UNBOUNDED = {"damping_cap_n_s_per_m": 0.0, "min_speed_m_per_s": 0.0}
+_BARE = {"cap": "none", "force_delay": "none", "small_leaks": 0.0}
 # What one change from the default does not show.
 _COMBINED: dict[str, tuple[dict[str, Any], ...]] = {
     "tdpa": (_UNBOUNDED, {**_UNBOUNDED, "observer": "printed", "reset": "never"}),
     PAPER: (
         {"window": 1},
-        {"cap": "fixed", "cap_damping_n_s_per_m": 50.0},
-        {"sum": "start", "rule": "signed", "cap": "none"},
-        {"sum": "start", "rule": "non-negative", "cap": "none"},
+        {"small_leaks": 0.0},
+        _BARE,
+        {**_BARE, "sum": "start", "rule": "signed"},
+        {**_BARE, "sum": "start", "rule": "non-negative"},
+        {**_BARE, "plateaus": "literal", "contact_loss": "ignored"},
     ),
 }
+
+
+SHORT = {
+    "unbounded": "damping_cap_n_s_per_m=0, min_speed_m_per_s=0",
+    "bare": "cap=none, force_delay=none, small_leaks=0",
+}
+"""Names for parameters that often stand together."""
+
+
+def short(label: str) -> tuple[str, str]:
+    """The law of a label, and its parameters as few words as possible."""
+    name, *values = label.split(":")
+    text = ", ".join(values)
+    for word, meaning in SHORT.items():
+        text = text.replace(meaning, word)
+    return name, text
 
 
 def every_reading() -> list[Reading]:

@@ -13,7 +13,7 @@ from rich.table import Table
 import hapticd
 from hapticd.study.grid.output import as_csv, as_json
 from hapticd.study.robustness.devices import DRAWN, DURATION_S, WITHIN_REACH, Device
-from hapticd.study.robustness.readings import PAPER
+from hapticd.study.robustness.readings import PAPER, short
 from hapticd.study.robustness.sweep import COLUMNS, Plan
 from hapticd.study.verdict import Outcome
 
@@ -117,8 +117,8 @@ class Report:
         for head in ("no delay", "1 sample late", "beyond reach", "settled in"):
             shown.add_column(head, justify="right", no_wrap=True)
         for one in self.summaries:
-            name, *values = one.reading.split(":")
-            label = f"  {', '.join(values)}" if values else f"[bold]{escape(name)}[/]"
+            name, values = short(one.reading)
+            label = f"  {escape(values)}" if values else f"[bold]{escape(name)}[/]"
             settled = "" if one.median_settled_s is None else f"{one.median_settled_s:.2f} s"
             beyond = f"{one.beyond.settled}/{one.beyond.devices}"
             shown.add_row(label, _percent(one.prompt), _percent(one.late), beyond, settled)

@@ -123,15 +123,13 @@ void log_call(const char *name) {
     logged_count++;
 }
 
-double now_us(void) {
-    double wall_us = 0;
-    if (bench->wall_scale > 0) {
-        struct timespec now;
-        clock_gettime(CLOCK_MONOTONIC, &now);
-        wall_us = (now.tv_sec * 1e6 + now.tv_nsec * 1e-3) * bench->wall_scale;
-    }
-    return bench->virtual_us + wall_us;
+double monotonic_us(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * 1e6 + now.tv_nsec * 1e-3;
 }
+
+double now_us(void) { return bench->virtual_us + bench->wall_scale * monotonic_us(); }
 
 int last_error(void) { return thread_error; }
 

@@ -22,8 +22,7 @@ static void prepare(struct device *d, double damping, double period_s) {
     d->coefficient_for[2] = period_s;
 }
 
-static void move(struct device *d) {
-    double period_s = the_bench()->period_us * 1e-6;
+static void move(struct device *d, double period_s) {
     bool driven = d->mode == FORCE;
     prepare(d, d->viscous_n_s_per_m + (d->mode == BRAKE ? d->brake_n_s_per_m : 0), period_s);
     double squared = 0;
@@ -69,8 +68,17 @@ static void measure(struct device *d) {
     d->updates++;
 }
 
-/* A period passes with each call for a position but the first, so that a run does not depend on the host's scheduling;
- * while time is held none does. */
+/* With `real_time` 0 a period passes with each call for a position but the first, so that a run does not depend on the
+ * host's scheduling; with 1 what really has; while time is held none does. */
+static double passed_us(struct device *d) {
+    struct bench *bench = the_bench();
+    double now = bench->real_time ? monotonic_us() : 0, last = d->moved_us;
+    d->moved_us = now;
+    if (!d->started || bench->held)
+        return 0;
+    return bench->real_time ? now - last : bench->period_us;
+}
+
 int sample(struct device *d) {
     struct bench *bench = the_bench();
     d->pose_calls++;
@@ -78,9 +86,10 @@ int sample(struct device *d) {
         struct timespec wait = {(time_t)(d->slow_us / 1e6), (long)fmod(d->slow_us * 1e3, 1e9)};
         nanosleep(&wait, NULL);
     }
-    if (d->started && !bench->held) {
-        bench->virtual_us += bench->period_us;
-        move(d);
+    double us = passed_us(d);
+    if (us > 0) {
+        bench->virtual_us += us;
+        move(d, us * 1e-6);
     }
     if (d->frozen)
         return 0;

@@ -28,14 +28,14 @@ enum cause { NONE, BUTTON, VELOCITY, WATCHDOG, SOFTWARE };
     S(turn_rad, 0) S(buttons, 0) S(emulate, 0) S(left_gap_negative, 0) \
     S(gravity, 1) S(effector_kg, 0.1) S(angle_deg, 0) S(max_force_n, -1) S(window_ms, 20) \
     S(guard_us, 100) S(watchdog, 0) S(trip_m_per_s, 5) S(has_watchdog, 1) \
-    S(heard_us, 0) S(updated_us, 0) S(started, 0) S(force_calls, 0) S(pose_calls, 0) S(updates, 0) \
+    S(heard_us, 0) S(updated_us, 0) S(moved_us, 0) S(started, 0) S(force_calls, 0) S(pose_calls, 0) S(updates, 0) \
     S(status_lag, 0) S(lag_left, 0) S(stale, 0) S(frozen, 0) S(garbage, 0) S(slow_us, 0) S(slow_calls, 0) \
     S(auto_init_fails, 0) S(auto_init_us, 0) S(stop_fails, 0) S(regulating, 0)
 
 /* Numbers of the bench: period of a tick, devices plugged in, what the SDK calls itself, how time passes. */
 #define BENCH_FIELDS(S, V) \
     S(period_us, 1000) S(count, 1) S(major, 3) S(minor, 17) S(no_strings, 0) \
-    S(held, 0) S(virtual_us, 0) S(wall_scale, 0)
+    S(real_time, 0) S(held, 0) S(virtual_us, 0) S(wall_scale, 0)
 
 #define SCALAR(name, value) double name;
 #define VECTOR(name) double name[3];
@@ -54,7 +54,8 @@ struct bench {
 /* bench.c */
 extern struct bench *bench;
 struct bench *the_bench(void);
-double now_us(void);
+double now_us(void);     /* for the electronics */
+double monotonic_us(void);
 void log_call(const char *name);
 int fail(int error);
 int last_error(void);
