@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import re
 import select
 import signal
 import sys
@@ -13,15 +15,17 @@ import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
+from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
-from rich.console import Console, Group
+from rich.console import CONSOLE_SVG_FORMAT, Console, Group
 from rich.live import Live
 
 from hapticd.cli.picture import SILENT_S, Known, frame, one_line
 from hapticd.client import Client, Event, Record, SilenceError, Status, connect
+from hapticd.contracts.errors import HapticdError
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, telemetry_endpoint
 
 FRAME_S = 0.1
@@ -29,6 +33,8 @@ FRAME_S = 0.1
 
 _PATIENCE_S = 3.0  # for a daemon, when one answer is all that was asked for
 _GATHER_S = 1.0  # what a single picture shows of its traces
+_KEEP_S = 4.0  # what a kept picture shows
+_SVG = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)  # a picture fetches no fonts
 _LOOK_AGAIN_S = 1.0  # a daemon may come up elsewhere than where this one first looked
 _SHOWN = ("position", "energy", "damping", "cycle", "event", "status")
 
@@ -44,6 +50,9 @@ def watch(
         ),
     ] = None,
     once: Annotated[bool, typer.Option("--once", help="Print one picture and exit.")] = False,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Keep four seconds as an SVG picture of 80x24 characters and exit.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every status as a line of JSON.")] = False,
 ) -> None:
     """Show live what a running daemon measures.
@@ -54,7 +63,7 @@ def watch(
     Example: hapticd watch --instance default
     """
     with suppress(KeyboardInterrupt):
-        show(endpoint, instance, once=once, as_json=as_json)
+        show(endpoint, instance, once=once, picture=picture, as_json=as_json)
 
 
 def show(
@@ -62,6 +71,7 @@ def show(
     instance: str = DEFAULT_INSTANCE,
     *,
     once: bool = False,
+    picture: Path | None = None,
     as_json: bool = False,
     stop: Callable[[], bool] = lambda: False,
 ) -> None:
@@ -71,17 +81,21 @@ def show(
         endpoint: where it publishes; None: the instance's own, looked for again while there is no daemon.
         instance: name of the daemon's instance, when no endpoint is given.
         once: one picture or one line of JSON, then end.
+        picture: where to keep one picture as SVG, then end.
         as_json: statuses as JSON and nothing else.
         stop: ends the view when it returns true; asked at every picture.
 
     Raises:
-        SilenceError: `once`, and no daemon answered.
+        SilenceError: `once` or `picture`, and no daemon answered.
+        UnwritableError: the picture cannot be written.
         SchemaError, WireError: what answers speaks otherwise.
         KeyboardInterrupt: Ctrl-C.
     """
     console = Console(highlight=False)
     with _Feed(endpoint, instance, ("status",) if as_json else _SHOWN) as feed:
-        if as_json:
+        if picture is not None:
+            _keep(feed, picture)
+        elif as_json:
             _print_json(feed, once, stop)
         elif once:
             _print_once(feed, console)
@@ -89,6 +103,10 @@ def show(
             _live(feed, console, stop)
         else:
             _print_lines(feed, stop)
+
+
+class UnwritableError(HapticdError):
+    """A file that cannot be written."""
 
 
 class _Feed:
@@ -186,6 +204,20 @@ def _keys() -> Iterator[Callable[[float], str]]:
         if descriptor >= 0:
             termios.tcsetattr(descriptor, termios.TCSADRAIN, settings)
         signal.signal(signal.SIGTERM, before)
+
+
+def _keep(feed: _Feed, path: Path) -> None:
+    """Write what a terminal of the usual size would show as SVG."""
+    feed.first()
+    end_s = time.monotonic() + _KEEP_S
+    while time.monotonic() < end_s:
+        feed.drain(0.05)
+    paper = Console(width=80, height=24, record=True, file=io.StringIO(), force_terminal=True, color_system="truecolor")
+    paper.print(Group(*frame(feed.known, feed.endpoint, 80, 24, time.monotonic())))
+    try:
+        paper.save_svg(str(path), title="hapticd watch", code_format=_SVG)
+    except OSError as error:
+        raise UnwritableError(f"{path}: {error.strerror}") from error
 
 
 def _print_once(feed: _Feed, console: Console) -> None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.contracts.errors import HapticdError
-from hapticd.control.predecessor import NOBODY, Predecessor
+from hapticd.contracts.record import Flag, TickRecord
+from hapticd.control.predecessor import NOBODY, Predecessor, identity
+from hapticd.control.shared import RECORDS
 from hapticd.supervisor.controlled import Control
 from hapticd.supervisor.start import Start
 
@@ -39,18 +42,44 @@ class Recovery:
         self._found_s = 0.0
         self._start: Start | None = None
 
-    def begin(self, before: Predecessor, why: str) -> None:
-        """Look for a device that has just been lost."""
+    def begin(self, control: Control, last: TickRecord, latched: bool, why: str) -> None:
+        """Look for a device that has just been lost.
+
+        Args:
+            control: the process that lost it and is about to end.
+            last: the last tick that was fetched, of that process or of one before it.
+            latched: a fault is not cleared.
+            why: how it was lost.
+        """
         now_s = time.monotonic()
         if now_s - self._found_s > STEADY_S:
             self._wait_s = FIRST_S
         self.lost = True
         self.lost_s = now_s
-        self.before = before
+        if control.shared.words[RECORDS]:
+            self.before = Predecessor(
+                seq=last.seq + 1,
+                skipped=control.skipped,
+                law=last.law,
+                may_arm=bool(last.flags & Flag.ARMED),
+                latched=latched or bool(last.flags & Flag.LATCHED),
+                device=identity(control.info),
+            )
+        else:  # lost again before it ticked
+            self.before = replace(self.before, latched=latched)
         self._put_off(why)
 
-    def turn(self, config: LoadedConfig) -> Control | None:
-        """Go on looking; returns at once. The control process that has the device, once there is one."""
+    def turn(self, lost: Control, config: LoadedConfig) -> Control | None:
+        """Go on looking; returns at once. The control process that has the device, once there is one.
+
+        Args:
+            lost: the process that lost it, which has to end first.
+            config: what the next one shall run.
+        """
+        if lost.exit_code is None:
+            if lost.stalled():  # in a driver that cannot let go of a device that is gone
+                lost.kill()
+            return None
         now_s = time.monotonic()
         try:
             if self._start is None:

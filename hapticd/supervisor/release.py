@@ -1,12 +1,16 @@
 """Take the force away after a control process that died or hangs: `python -m hapticd.supervisor.release`.
 
-A short-lived process of its own, so that a driver that hangs cannot hang the supervisor. It reads the configuration's
-text from its standard input.
+A process of its own, so that a driver that hangs cannot hang the supervisor. It stands by from the start with
+everything imported, since the device holds its last force until it is released, and the start of an interpreter would
+be most of that time. It reads one byte from its standard input: one means release, none that it is not needed.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
+import os
+import signal
 import subprocess
 import sys
 
@@ -17,32 +21,66 @@ TIMEOUT_S = 2.0
 """How long the device may take to let go [s]."""
 
 
-def release_device(config: LoadedConfig) -> str:
-    """Open the device in a helper process and disable it.
+class Release:
+    """A helper that stands by.
 
-    Returns:
-        What came of it, a line for people.
+    Args:
+        config: names the device; what of it a reload may change is of no matter here.
     """
-    try:
-        helper = subprocess.run(
-            [sys.executable, "-m", "hapticd.supervisor.release"],
-            input=config.text.encode(),
-            capture_output=True,
-            timeout=TIMEOUT_S,
-            check=False,
+
+    def __init__(self, config: LoadedConfig) -> None:
+        self._config = config
+        self._helper = _start(config)
+
+    def release(self) -> str:
+        """Open the device in the helper and disable it.
+
+        Returns:
+            What came of it, a line for people.
+        """
+        if self._helper.poll() is not None:  # somebody has killed it
+            self.close()
+            self._helper = _start(self._config)
+        try:
+            _, said = self._helper.communicate(b"!", TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            return f"the device did not answer within {TIMEOUT_S:g} s; its own watchdog has to release it"
+        if self._helper.returncode:
+            return f"the device could not be opened: {said.decode(errors='replace').strip()}"
+        return "the device is without force"
+
+    def close(self) -> None:
+        """The helper is not needed any more."""
+        self._helper.kill()
+        self._helper.communicate()
+
+
+def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
+    with os.fdopen(os.memfd_create("configuration"), "w+b") as file:
+        file.write(config.text.encode())
+        file.seek(0)
+        return subprocess.Popen(
+            [sys.executable, "-m", "hapticd.supervisor.release", "--config", str(file.fileno())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            pass_fds=[file.fileno()],
+            start_new_session=True,
         )
-    except subprocess.TimeoutExpired:
-        return f"the device did not answer within {TIMEOUT_S:g} s; its own watchdog has to release it"
-    if helper.returncode:
-        return f"the device could not be opened: {helper.stderr.decode(errors='replace').strip()}"
-    return "the device is without force"
 
 
 def main() -> int:
-    """Open, disable, close."""
+    """Stand by; then open, disable, close."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd tells all at once; the supervisor's end is the end of this
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--config", type=int, required=True)
+    arguments = parser.parse_args()
     try:
-        config = parse(sys.stdin.read(), "standard input")
+        with os.fdopen(arguments.config, "rb") as file:
+            config = parse(file.read().decode(), "configuration")
         driver = config.driver(config.options, config.config.loop.period_s)
+        if not sys.stdin.buffer.read(1):
+            return 0
         driver.open()
         driver.close()
     except HapticdError as error:

@@ -11,9 +11,7 @@ from dataclasses import replace
 from hapticd.config.loading import LoadedConfig
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import Event, EventCode
-from hapticd.contracts.record import Flag
-from hapticd.control.predecessor import Predecessor, identity
-from hapticd.control.shared import RECORDS
+from hapticd.contracts.record import Flag, TickRecord
 from hapticd.faults.place import fault_directory
 from hapticd.supervisor.chronicle import Chronicle, log
 from hapticd.supervisor.commands import CommandSocket, Reply
@@ -21,7 +19,7 @@ from hapticd.supervisor.controlled import END_TIMEOUT_S
 from hapticd.supervisor.instance import InstanceLock
 from hapticd.supervisor.notify import Notifier
 from hapticd.supervisor.recovery import Recovery
-from hapticd.supervisor.release import release_device
+from hapticd.supervisor.release import Release
 from hapticd.supervisor.reload import switch_letter, wanted_config
 from hapticd.supervisor.report import Report
 from hapticd.supervisor.requests import Answer, Requests
@@ -71,6 +69,8 @@ class Service:
             undo.callback(self.lock.close)
             self.control = Start(config).wait()
             undo.callback(self._end_control)
+            self.release = Release(config)
+            undo.callback(self.release.close)
             self.publisher = Publisher(
                 config.config.telemetry, self.lock.directory / TELEMETRY, self.control.info, offset_ns
             )
@@ -86,7 +86,6 @@ class Service:
         self._device_lost: Event | None = None
         self._dropped_told = 0
         self._status_due_s = 0.0
-        self._fed_s = 0.0
         self._stopping = False
         self._stop_by_s = 0.0
 
@@ -152,7 +151,7 @@ class Service:
         if records:
             if before is None:
                 self.notifier.send("READY=1")
-            self._feed_watchdog()
+            self.notifier.feed_watchdog()
             if before is None or (before.flags ^ records[-1].flags) & ~Flag.LIMITED:
                 self._status_due_s = 0.0
         self.publisher.publish(records)
@@ -175,7 +174,7 @@ class Service:
             pass
         self.requests.turn()
         if self._device_lost is not None and self.report.last is not None and not self._stopping:
-            self._begin_recovery(self._device_lost)
+            self._begin_recovery(self._device_lost, self.report.last)
         elif ended:
             self._control_ended()
         elif self.control.stalled():
@@ -185,12 +184,8 @@ class Service:
 
     def _look_for_device(self) -> None:
         """Try again when it is time; that nothing ticks meanwhile is no reason for systemd to intervene."""
-        self._feed_watchdog()
-        if self.control.exit_code is None:
-            if self.control.stalled():  # in a driver that cannot let go of a device that is gone
-                self.control.kill()
-            return
-        control = self.recovery.turn(self.config)
+        self.notifier.feed_watchdog()
+        control = self.recovery.turn(self.control, self.config)
         if control is None:
             return
         self.control.close()
@@ -200,13 +195,6 @@ class Service:
         self.report.expect(self.recovery.before)
         away_s = time.monotonic() - self.recovery.lost_s
         self._tell_now(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)
-
-    def _feed_watchdog(self) -> None:
-        """Tell systemd that ticks advance, at half the interval that it asks for."""
-        now_s = time.monotonic()
-        if self.notifier.watchdog_s and now_s - self._fed_s > 0.5 * self.notifier.watchdog_s - DRAIN_S:
-            self._fed_s = now_s
-            self.notifier.send("WATCHDOG=1")
 
     def _tell_now(self, code: EventCode, text: str, **fields: float | int | str) -> None:
         self.chronicle.tell_now(code, text, self.config, self.control, **fields)
@@ -233,33 +221,20 @@ class Service:
             how = f"was killed by signal {-code}" if code and code < 0 else f"ended with exit code {code}"
             self._control_lost(f"the control process {how}")
 
-    def _begin_recovery(self, event: Event) -> None:
+    def _begin_recovery(self, event: Event, last: TickRecord) -> None:
         """The loop has told that its device is gone; it is just ending."""
         self._device_lost = None
         while self._publish():
             pass
         self.chronicle.recorder.loop_ended()
         self.requests.abandon(event.text)
-        self.recovery.begin(self._predecessor(), event.text.removeprefix("device lost: "))
-
-    def _predecessor(self) -> Predecessor:
-        """What the control process that lost its device leaves to the next one."""
-        last = self.report.last
-        if last is None or not self.control.shared.words[RECORDS]:
-            return replace(self.recovery.before, latched=self.chronicle.latched)
-        return Predecessor(
-            seq=last.seq + 1,
-            skipped=self.control.skipped,
-            law=last.law,
-            may_arm=bool(last.flags & Flag.ARMED),
-            latched=self.chronicle.latched or bool(last.flags & Flag.LATCHED),
-            device=identity(self.control.info),
-        )
+        why = event.text.removeprefix("device lost: ")
+        self.recovery.begin(self.control, self.report.last or last, self.chronicle.latched, why)
 
     def _control_lost(self, text: str) -> None:
         """The loop no longer looks after the device: take the force away from outside, and end."""
         self.control.kill()
-        outcome = release_device(self.config)
+        outcome = self.release.release()
         self._tell_now(EventCode.CONTROL_LOST, f"{text}; {outcome}")
         self.exit_code = 1
 

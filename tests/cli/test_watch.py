@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import pty
+import re
 import select
 import signal
 import struct
@@ -285,6 +286,14 @@ def test_once_prints_one_picture(feed: Feed) -> None:
     assert max(map(len, lines)) <= 80
     assert "ARMED" in lines[0]
     assert "position" in printed
+
+
+def test_a_picture_is_kept_that_fetches_nothing(feed: Feed, tmp_path: Path) -> None:
+    kept = tmp_path / "watch.svg"
+    plain(feed, "--picture", str(kept), until=lambda _: kept.exists())
+    drawn = kept.read_text()
+    assert "ARMED" in drawn
+    assert "url(" not in re.sub(r"url\(#[^)]*\)", "", drawn)
 
 
 def test_once_without_a_daemon_fails_with_one_line(

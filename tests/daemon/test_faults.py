@@ -213,7 +213,7 @@ def test_a_device_that_hangs_is_released_from_outside_and_the_service_ends(recor
             events = events_until(subscribers[order], EventCode.CONTROL_LOST)
             assert faults(events) == [EventCode.CONTROL_LOST]
             felt = rig.released()
-            record_property(order, felt)
+            record_property(f"{order}_released_after_ms", felt.gone_after_ms)
             assert (felt.writes, felt.force_n, felt.opened) == (0, 0.0, 1)
             assert rig.daemon.wait_exit() == 1
             assert nothing_left(rig.daemon)
@@ -228,7 +228,7 @@ def test_a_supervisor_that_stalls_takes_the_force_out(record_property: Report) -
         rig.daemon.process.send_signal(signal.SIGSTOP)
         wait_until(lambda: all_records(memory)[-1].flags & 8, "the fault")
         records = all_records(memory)
-        at = next(index for index, record in enumerate(records) if not record.flags & 1)
+        at = next(index for index, record in enumerate(records) if record.flags & 8)
         wait_until(lambda: all_records(memory)[-1].seq > records[at].seq + RAMP, "the ramp")
         ramp = [abs(record.force_n[0]) for record in all_records(memory) if record.seq >= records[at].seq]
         record_property("ticks_until_released", ramp.index(0.0))
@@ -257,7 +257,7 @@ def test_records_reach_back_five_seconds_and_the_oldest_goes_first() -> None:
         for topic, fields in subscriber.maps():
             if topic == "hapticd/position" and fields["seq"] > 5500:
                 break
-        names = []
+        names: list[str] = []
         for _ in range(2):
             rig.order("jump")
             subscriber.until("hapticd/event", code=EventCode.OVER_SPEED)

@@ -12,6 +12,7 @@ import struct
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import ClassVar
 
 from hapticd.contracts.driver import DeviceInfo, Sample
 from hapticd.contracts.errors import DeviceDisconnectedError, DeviceFaultError, DeviceNotFoundError
@@ -35,7 +36,7 @@ class FaultyOptions(SimulationOptions):
 class Faulty(Loopback):
     """The loopback device with a mind of its own."""
 
-    Options = FaultyOptions
+    Options: ClassVar[type[SimulationOptions]] = FaultyOptions
 
     def _open(self) -> DeviceInfo:
         assert isinstance(self.options, FaultyOptions)

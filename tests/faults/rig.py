@@ -200,7 +200,7 @@ class Rig:
 
 def events_until(subscriber: Subscriber, code: EventCode) -> list[dict[str, Any]]:
     """Every event up to one of this code."""
-    seen = []
+    seen: list[dict[str, Any]] = []
     end_s = time.monotonic() + PATIENCE_S
     for topic, fields in subscriber.maps():
         assert time.monotonic() < end_s, f"no event {code} after {[event['text'] for event in seen]}"

@@ -155,6 +155,25 @@ def test_a_missing_extra_is_named() -> None:
         require_extra("cluster", "json", "no_such_module")
 
 
+@pytest.mark.parametrize("study", ["zwidth", "robustness"])
+@pytest.mark.parametrize(("hidden", "extra"), [("numba", "study"), ("matplotlib", "study"), ("distributed", "cluster")])
+def test_a_study_without_its_extra_names_it_in_one_line(study: str, hidden: str, extra: str) -> None:
+    script = (
+        "import sys\n"
+        "from importlib.machinery import PathFinder\n"
+        "class Without:\n"
+        "    @staticmethod\n"
+        "    def find_spec(name, path=None, target=None):\n"
+        f"        return None if name == {hidden!r} else PathFinder.find_spec(name, path, target)\n"
+        "sys.meta_path = [Without if finder is PathFinder else finder for finder in sys.meta_path]\n"
+        "from hapticd.cli import main\n"
+        f"main(['study', {study!r}, '--cluster', 'tcp://127.0.0.1:1'])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == f"hapticd: this needs {hidden}: pip install 'hapticd[{extra}]'\n"
+
+
 def test_what_would_not_fit_into_memory_is_refused() -> None:
     require_memory(1e6, "--cells 10x10")
     with pytest.raises(ConfigError, match=r"--cells 1e9x1e9: would take \S+ GiB"):

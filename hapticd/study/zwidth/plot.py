@@ -26,8 +26,8 @@ _COLOURS = {
 }
 _LINES: dict[str, dict[str, Any]] = {
     "stable": {"color": style.INK, "linestyle": "-", "linewidth": 1.8},
-    "passive": {"color": style.ORANGE, "linestyle": (0, (5, 3)), "linewidth": 1.8},
-    "quantised-passive": {"color": style.RED, "linestyle": (0, (1.2, 1.6)), "linewidth": 2.0},
+    "passive": {"color": style.RED, "linestyle": (0, (5, 3)), "linewidth": 1.8},
+    "quantised-passive": {"color": style.INK, "linestyle": (0, (1.2, 1.6)), "linewidth": 2.0},
 }
 _COLUMNS = 3
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from hapticd_drivers.forcedimension import discovery
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from hapticd_drivers.forcedimension.options import ForceDimensionOptions
 
@@ -60,6 +61,11 @@ class Bench:
     def attach(self, file: Path | None) -> None:
         """Turn to the devices in a file, or with None to new ones; a process sees one bench at a time."""
         assert self.library.fake_attach(None if file is None else str(file).encode()) == 0
+
+    def die(self) -> None:
+        """The program that drove the devices is gone, without a word to them."""
+        self.library.fake_die()
+        discovery._in_use.clear()
 
     def set(self, device: int = 0, **values: float | Sequence[float]) -> None:
         """Set numbers of a device, or of the bench for device -1."""

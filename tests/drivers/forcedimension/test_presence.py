@@ -17,6 +17,7 @@ import usb.core
 from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, DevicePermissionError
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.driver import ForceDimension
+from hapticd_drivers.forcedimension.options import ForceDimensionOptions
 from hapticd_drivers.forcedimension.presence import UsbDevice
 from tests.drivers.forcedimension.bench import Bench
 
@@ -161,8 +162,8 @@ def on_bus(monkeypatch: pytest.MonkeyPatch) -> list[UsbDevice]:
     return seen
 
 
-def options(library: Path) -> ForceDimension.Options:
-    return ForceDimension.Options.model_validate({"library": str(library)})
+def options(library: Path) -> ForceDimensionOptions:
+    return ForceDimensionOptions.model_validate({"library": str(library)})
 
 
 def test_find_without_the_sdk_still_shows_what_usb_shows(on_bus: list[UsbDevice], tmp_path: Path) -> None:

@@ -1,4 +1,8 @@
-"""The paper's walls through the driver on the fake omega.7: on a tick's own time, and in the whole daemon."""
+"""The paper's walls through the driver on the fake omega.7.
+
+Tick by tick, where a period passes with each and one run decides; and in the whole daemon, where the device moves in
+real time, since the loop takes dt from the clock of a computer that is never quite on time.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +34,7 @@ def config(bench: Bench, stiffness_n_per_m: float, law: str = "energy-cycle", ra
     return f"""
         [loop]
         rate_hz = {rate_hz}
+        law_budget = 1.0
         [device]
         driver = "omega7"
         [device.options]
@@ -143,7 +148,7 @@ class Lab:
         self.rate_hz = rate_hz
         self.bench = Bench(fake_sdk, file)
         press(self.bench, 0.003, rate_hz)
-        self.bench.set(-1, wall_scale=SLOW)
+        self.bench.set(-1, wall_scale=SLOW, real_time=1)
         os.environ["FAKE_DHD_FILE"] = str(file)
         try:
             self.daemon = Daemon(config(self.bench, stiffness_n_per_m, law, rate_hz))

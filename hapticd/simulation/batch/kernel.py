@@ -1,0 +1,266 @@
+"""One loop from its first tick to its last.
+
+The order of a tick is the daemon's: move, sample, velocity, contact, law, limit, books, write. What the daemon does at
+transitions is not here: a loop that starts inside the wall has its force at once, without a ramp.
+
+Memory does not grow with the simulated time unless a trace is asked for. Switches in capitals are what a loop has,
+beside the terms of the plant; `bound` removes the branches of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from hapticd.simulation.plant import move, sense
+from hapticd.simulation.specialise import specialise
+
+WALL_DAMPING: bool = True
+LONG_VELOCITY: bool = True
+LIMIT: bool = True
+LEDGER: bool = True
+LAW_DAMPING: bool = True
+LAW_MASS: bool = True
+SETTLING: bool = True
+TRACE: bool = True
+
+FARTHEST_M = 1e6
+MOST = 1e18
+MOST_M_PER_S = 1e6
+TRACE_COLUMNS = ("x_m", "v_m_per_s", "x_measured_m", "force_n", "energy_j", "damping_n_s_per_m")
+
+
+class LoopBuffers(NamedTuple):
+    """Histories of the loop: lists when interpreted, arrays when compiled."""
+
+    position_m: Any
+    time_s: Any
+
+
+class LoopState:
+    """What the loop remembers, and what it reports at the end."""
+
+    force_n: float
+    last_m: float
+    velocity_m_per_s: float
+    newest: int
+    filled: int
+    applied_spring_n: float
+    low_m: float
+    high_m: float
+    low_measured_m: float
+    high_measured_m: float
+    sum_x_m: float
+    sum_force_n: float
+    peak_force_n: float
+    damping_n_s_per_m: float
+    felt_mass_kg: float
+    outside_tick: int
+    ticks: int
+    finite: bool
+
+
+class LoopParams:
+    """What one loop is given."""
+
+    dt_s: float
+    limit_n: float
+    samples: int
+    target_m: float
+    band_m: float
+    first_segment: int
+    end_segment: int
+    trace_every: int
+
+
+class Segment:
+    """Ticks over which nothing is changed from outside."""
+
+    start: int
+    stop: int
+    epoch: int
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+    last_window: bool
+
+
+def law_step(state: Any, params: Any, tick: Any) -> float:
+    """Stands for the law; `specialise` puts the real one here."""
+    raise NotImplementedError
+
+
+def ledger_update(
+    ledger: Any,
+    moved_m: float,
+    applied_n: float,
+    spring_n: float,
+    stored_j: float,
+    inside: bool,
+    damping: float,
+    dt_s: float,
+) -> None:
+    """Stands for `EnergyLedger.update`."""
+    raise NotImplementedError
+
+
+def run(
+    plant: Any,
+    plant_epochs: Any,
+    buffers: Any,
+    history: Any,
+    loop: Any,
+    params: Any,
+    segments: Any,
+    law_state: Any,
+    law_params: Any,
+    tick: Any,
+    ledger: Any,
+    trace: Any,
+) -> None:
+    """One loop from its first tick to its last."""
+    for at in range(params.first_segment, params.end_segment):
+        segment = segments[at]
+        plant_params = plant_epochs[segment.epoch]
+        stiffness = segment.stiffness_n_per_m
+        wall_damping = segment.damping_n_s_per_m
+        last_window = segment.last_window
+        for count in range(segment.start, segment.stop):
+            loop.ticks = count
+            move(plant, plant_params, buffers, loop.force_n)
+            sense(plant, plant_params)
+            x_m = plant.measured_m
+            if not (-FARTHEST_M < x_m < FARTHEST_M):
+                loop.finite = False
+                return
+
+            # velocity
+            if LONG_VELOCITY and params.samples > 1:
+                velocity = long_difference(loop, params, history, x_m)
+            else:
+                velocity = (x_m - loop.last_m) / params.dt_s
+            loop.last_m = x_m
+            if not (-MOST_M_PER_S < velocity < MOST_M_PER_S):
+                loop.finite = False
+                return
+
+            # contact
+            tick.moved_m = x_m - tick.x_m
+            tick.x_m = x_m
+            tick.velocity_m_per_s = velocity
+            spring_n = 0.0
+            if x_m < 0.0:
+                tick.in_contact = True
+                spring_n = -stiffness * x_m
+                contact_n = spring_n
+                if WALL_DAMPING and wall_damping != 0.0:
+                    contact_n = spring_n - wall_damping * velocity
+                tick.contact_n = contact_n
+            else:
+                tick.in_contact = False
+                tick.contact_n = 0.0
+
+            # law
+            force_n = law_step(law_state, law_params, tick)
+            if not tick.in_contact:
+                force_n = 0.0
+            if not (-MOST < force_n < MOST):
+                loop.finite = False
+                return
+
+            # limit
+            share = 1.0
+            if LIMIT and (force_n > params.limit_n or force_n < -params.limit_n):
+                share = params.limit_n / abs(force_n)
+
+            # books
+            if LAW_DAMPING:
+                loop.damping_n_s_per_m = law_state.damping_n_s_per_m
+            if LAW_MASS:
+                loop.felt_mass_kg = law_state.felt_mass_kg
+            if LEDGER:
+                stored_j = 0.0
+                if x_m < 0.0:
+                    stored_j = -0.5 * spring_n * x_m
+                    if LIMIT and spring_n > params.limit_n:
+                        stored_j = params.limit_n * (-x_m - 0.5 * params.limit_n / stiffness)
+                ledger_update(
+                    ledger,
+                    tick.moved_m,
+                    tick.applied_n,
+                    loop.applied_spring_n,
+                    stored_j,
+                    tick.in_contact,
+                    loop.damping_n_s_per_m,
+                    params.dt_s,
+                )
+                loop.applied_spring_n = spring_n
+                if LIMIT and spring_n > params.limit_n:
+                    loop.applied_spring_n = params.limit_n
+            tick.applied_n = share * force_n
+            tick.applied_contact_n = share * tick.contact_n
+            loop.force_n = tick.applied_n
+
+            # report
+            if tick.applied_n > loop.peak_force_n:
+                loop.peak_force_n = tick.applied_n
+            elif tick.applied_n < -loop.peak_force_n:
+                loop.peak_force_n = -tick.applied_n
+            if SETTLING:
+                off_m = plant.x_m - params.target_m
+                if not (-params.band_m <= off_m <= params.band_m):
+                    loop.outside_tick = count
+            if last_window:
+                report(plant, loop)
+            if TRACE and (count + 1) % params.trace_every == 0:
+                record(plant, loop, ledger, trace, count // params.trace_every)
+        loop.ticks = segment.stop
+
+
+def long_difference(loop: Any, params: Any, history: Any, position_m: float) -> float:
+    """`hapticd.velocity.LongDifference`, step by step, times included: its sums decide the last bit."""
+    size = params.samples + 1
+    last_s = history.time_s[loop.newest]
+    if last_s > 10.0:
+        for at in range(size):
+            history.time_s[at] -= last_s
+        last_s = 0.0
+    loop.newest = (loop.newest + 1) % size
+    history.position_m[loop.newest] = position_m
+    history.time_s[loop.newest] = last_s + params.dt_s
+    if loop.filled < size:
+        loop.filled += 1
+    oldest = (loop.newest + 1 - loop.filled + size) % size
+    span_s = history.time_s[loop.newest] - history.time_s[oldest]
+    return (position_m - history.position_m[oldest]) / span_s  # type: ignore[no-any-return]
+
+
+def report(plant: Any, loop: Any) -> None:
+    """Enter one tick of the last window."""
+    if plant.x_m < loop.low_m:
+        loop.low_m = plant.x_m
+    if plant.x_m > loop.high_m:
+        loop.high_m = plant.x_m
+    if plant.measured_m < loop.low_measured_m:
+        loop.low_measured_m = plant.measured_m
+    if plant.measured_m > loop.high_measured_m:
+        loop.high_measured_m = plant.measured_m
+    loop.sum_x_m += plant.x_m
+    loop.sum_force_n += plant.applied_n
+
+
+def record(plant: Any, loop: Any, ledger: Any, trace: Any, row: int) -> None:
+    """Enter one tick into the trace."""
+    trace[row, 0] = plant.x_m
+    trace[row, 1] = plant.v_m_per_s
+    trace[row, 2] = plant.measured_m
+    trace[row, 3] = loop.force_n
+    trace[row, 4] = ledger.energy_j
+    trace[row, 5] = loop.damping_n_s_per_m
+
+
+def bound(switches: Mapping[str, bool], step: Callable[..., Any], update: Callable[..., Any]) -> Callable[..., None]:
+    """`run` with the terms, the law and the ledger that it needs."""
+    calls: dict[str, Callable[..., Any]] = {"law_step": step, "ledger_update": update}
+    calls["move"] = specialise(move, switches)
+    calls["sense"] = specialise(sense, switches)
+    return specialise(run, switches, calls)

@@ -1,0 +1,58 @@
+"""The loop as machine code, over all points of a batch side by side."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from types import ModuleType
+from typing import Any
+
+from numba import njit, prange
+
+from hapticd.energy import EnergyLedger
+from hapticd.simulation.batch.kernel import LoopBuffers, bound
+from hapticd.simulation.compile import OPTIONS, compiled, compiled_step, on_stack
+from hapticd.simulation.plant import Buffers
+
+
+@lru_cache(maxsize=32)
+def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any:
+    """A function of a first point, the point to stop at and `Arrays`, that runs these points on all threads.
+
+    Raises:
+        PluginError: the law cannot be compiled.
+    """
+    memo = {law.step: compiled_step(law)}
+    loop = compiled(bound(dict(switches), law.step, EnergyLedger.update), memo)
+
+    @njit(**OPTIONS)  # type: ignore[untyped-decorator]
+    def one(at: Any, arrays: Any) -> None:
+        state = on_stack(arrays.loops[at])
+        law_state = on_stack(arrays.law_states[at])
+        ledger = on_stack(arrays.ledgers[at])
+        line = slice(arrays.line_from[at], arrays.line_from[at + 1])
+        points = slice(arrays.points_from[at], arrays.points_from[at + 1])
+        past = slice(arrays.history_from[at], arrays.history_from[at + 1])
+        loop(
+            on_stack(arrays.plants[at]),
+            arrays.epochs,
+            Buffers(arrays.lines[line], arrays.points_s[points], arrays.points_n[points]),
+            LoopBuffers(arrays.history_m[past], arrays.history_s[past]),
+            state,
+            on_stack(arrays.params[at]),
+            arrays.segments,
+            law_state,
+            on_stack(arrays.law_params[at]),
+            on_stack(arrays.ticks[at]),
+            ledger,
+            arrays.traces[at],
+        )
+        arrays.loops[at] = state
+        arrays.law_states[at] = law_state
+        arrays.ledgers[at] = ledger
+
+    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]
+    def sweep(first: Any, stop: Any, arrays: Any) -> None:
+        for at in prange(first, stop):
+            one(at, arrays)
+
+    return sweep

@@ -1,0 +1,35 @@
+"""One loop of a batch, as a study asks for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hapticd.config.models import WallConfig
+from hapticd.contracts.law import LawParams
+from hapticd.simulation.options import SimulationOptions
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One loop of a grid.
+
+    Attributes:
+        device: the device model, hand included.
+        wall: stiffness, damping and their changes; where it stands does not matter.
+        params: the law's parameters.
+        period_s: time between ticks [s].
+        max_force_n: the guard's limit [N].
+        velocity_samples: samples that the velocity difference spans.
+        target_m: where it should settle; None: where hand and springs balance, known for a constant hand only [m].
+        band_m: settled means within this of the target; None: 5 % of it, at least three counts [m].
+    """
+
+    device: SimulationOptions
+    wall: WallConfig
+    params: LawParams
+    period_s: float = 1e-3
+    max_force_n: float = math.inf
+    velocity_samples: int = 1
+    target_m: float | None = None
+    band_m: float | None = None

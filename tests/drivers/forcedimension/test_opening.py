@@ -1,0 +1,104 @@
+"""Which device is opened, what each type declares, and what is said when none can be."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from hapticd.contracts.driver import DriverState
+from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, PluginError
+from hapticd_drivers.forcedimension.driver import ForceDimension
+from hapticd_drivers.forcedimension.models import MODELS
+from tests.drivers.forcedimension.bench import BRAKE, FORCE, RIGHT, Bench
+
+
+def test_a_device_is_picked_by_its_serial_number_and_the_others_are_left(bench: Bench) -> None:
+    bench.set(-1, count=3)
+    driver = bench.driver(serial=1003)
+    assert driver.open().serial == "1003"
+    assert [bench.get("holder", device) for device in range(3)] == [0, 0, os.getpid()]
+    other = bench.driver()
+    assert other.open().serial == "1001"
+    third = bench.driver(serial=1003)
+    with pytest.raises(DeviceBusyError, match=r"omega\.7 1001 is already open in this process"):
+        third.open()
+    with pytest.raises(DeviceBusyError):
+        bench.driver(serial=1003).open()
+    assert bench.get("holder", 2) == os.getpid()  # opening again what this process has must not close it
+    driver.read()
+    driver.close()
+    other.close()
+    with pytest.raises(
+        DeviceNotFoundError, match=r"serial number 7; there is omega\.7 1001, omega\.7 1002, omega\.7 1003"
+    ):
+        bench.driver(serial=7).open()
+
+
+def test_the_first_device_that_can_be_used_is_taken(bench: Bench) -> None:
+    bench.set(-1, count=3)
+    bench.set(0, type=60)
+    bench.set(1, holder=1)  # process 1 is alive
+    driver = bench.driver()
+    assert driver.open().serial == "1003"
+    driver.close()
+    bench.set(-1, count=1)
+    with pytest.raises(DeviceNotFoundError, match="does not know how to use Novint Falcon 1001"):
+        bench.driver().open()
+
+
+def test_a_device_of_another_process_is_busy(bench: Bench) -> None:
+    bench.set(holder=1)
+    with pytest.raises(DeviceBusyError, match=r"device already in use.*another program has the device"):
+        bench.driver().open()
+
+
+def test_every_type_has_limits_of_its_own(bench: Bench) -> None:
+    seen = {}
+    for device_type in MODELS:
+        bench.set(type=device_type)
+        driver = bench.driver()
+        info = driver.open()
+        seen[info.model] = (info.max_force_n, info.has_orientation, info.has_gripper)
+        driver.close()
+    assert seen["omega.3"] == (12.0, False, False)
+    assert seen["omega.6, left-handed"] == (12.0, True, False)
+    assert seen["omega.7"] == (12.0, True, True)
+    assert seen["delta.3"] == (20.0, False, False)
+    assert seen["sigma.7"] == (12.0, True, True)
+    assert "lambda.7, left-handed" in seen
+
+
+def test_safe_damping_falls_with_the_rate() -> None:
+    model = MODELS[RIGHT]
+    assert model.safe_damping_n_s_per_m(1e-3) == 30.0
+    assert model.safe_damping_n_s_per_m(1e-2) == pytest.approx(5.0)
+
+
+def test_an_sdk_that_is_too_old_is_refused(bench: Bench) -> None:
+    bench.set(-1, minor=13)
+    with pytest.raises(PluginError, match=r"is SDK 3\.13\.5\.0; hapticd needs 3\.14 or newer"):
+        bench.driver().open()
+
+
+def test_without_the_sdk_the_driver_says_how_to_get_it(tmp_path: Path) -> None:
+    driver = ForceDimension(ForceDimension.Options.model_validate({"library": str(tmp_path)}), 1e-3)
+    with pytest.raises(PluginError, match=r"SDK cannot be loaded \(.*no libdrd\.so in it\): install it and set FDSDK"):
+        driver.open()
+    assert driver.state is DriverState.CLOSED
+    assert "cannot be loaded" in ForceDimension.lacks(driver.options)
+
+
+def test_forces_that_a_dead_program_left_on_are_off_once_the_device_is_opened(bench: Bench) -> None:
+    left = bench.driver()
+    left.open()
+    left.enable()
+    left.write([0.0, 0.0, 3.0])
+    bench.die()
+    assert bench.get("mode") == FORCE
+    driver = bench.driver()
+    driver.open()
+    assert bench.get("mode") == BRAKE
+    assert bench.vector("force_n") == [0.0, 0.0, 0.0]
+    driver.close()
