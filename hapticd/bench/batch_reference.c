@@ -1,4 +1,4 @@
-/* The closed loop of hapticd/simulation/batch.py by hand in C: omega7-like device, one wall, energy-cycle law.
+/* The closed loop of hapticd/simulation/batch by hand in C: omega7-like device, one wall, energy-cycle law.
  *
  * The same arithmetic in the same order, so that results agree to the last bit. batch.py writes the structs of
  * batch_types.h from the records that the compiled Python uses.

@@ -22,7 +22,7 @@ def specialise(
 ) -> FunctionT:
     """A copy of a function without the branches that its switches rule out.
 
-    Functions of the same module that it calls are specialised with it. The copy keeps name, file and line numbers,
+    Functions of the same package that it calls are specialised with it. The copy keeps name, file and line numbers,
     so that a traceback points at the source.
 
     Args:
@@ -57,12 +57,16 @@ def _specialise(
     names.update(calls)
     for name in {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)} - set(dict(calls)):
         callee = names.get(name)
-        if isinstance(callee, FunctionType) and callee.__module__ == function.__module__ and callee is not function:
+        if isinstance(callee, FunctionType) and _package(callee) == _package(function) and callee is not function:
             names[name] = _specialise(callee, switches, calls)
     exec(compile(tree, inspect.getfile(function), "exec"), names)
     specialised = names[function.__name__]
     assert isinstance(specialised, FunctionType)
     return specialised
+
+
+def _package(function: FunctionType) -> str:
+    return function.__module__.rpartition(".")[0] or function.__module__
 
 
 class _Pruner(ast.NodeTransformer):

@@ -1,0 +1,36 @@
+"""Read a daemon's telemetry.
+
+    from hapticd.client import Cycle, Gap, connect
+
+    with connect(topics=[Cycle]) as client:
+        for record in client:
+            print(record)
+
+The contract behind it is docs/telemetry.md; any language with ZeroMQ and msgpack can read the same.
+"""
+
+from hapticd.client.connection import Client, connect
+from hapticd.client.decoding import decode
+from hapticd.client.errors import ClientError, SchemaError, SilenceError, WireError
+from hapticd.client.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Timing
+from hapticd.telemetry.status import Status
+
+__all__ = [
+    "Client",
+    "ClientError",
+    "Cycle",
+    "Damping",
+    "Energy",
+    "Event",
+    "Gap",
+    "Input",
+    "Position",
+    "Record",
+    "SchemaError",
+    "SilenceError",
+    "Status",
+    "Timing",
+    "WireError",
+    "connect",
+    "decode",
+]

@@ -1,0 +1,172 @@
+"""A subscription to a daemon: records as they arrive, and gaps where they did not."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import zmq
+
+from hapticd.client.decoding import decode
+from hapticd.client.errors import ClientError, SchemaError, SilenceError, WireError
+from hapticd.client.records import Gap, Record, Sent
+from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, telemetry_endpoint
+from hapticd.telemetry.status import Status
+from hapticd.telemetry.wire import SCHEMA, Topic
+
+_EVERY_TICK = (Topic.POSITION, Topic.ENERGY, Topic.DAMPING, Topic.TIMING)
+_LARGEST_MESSAGE = 16 * 1024 * 1024
+
+
+def connect(
+    endpoint: str | None = None,
+    instance: str = DEFAULT_INSTANCE,
+    topics: Sequence[type[Sent] | Topic | str] = tuple(Topic),
+    timeout_s: float | None = None,
+    receive_high_water: int = 1000,
+) -> Client:
+    """Subscribe to a daemon. It need not run yet, and may be restarted: ZeroMQ connects again by itself.
+
+    Args:
+        endpoint: for example "tcp://127.0.0.1:9872"; None: the instance's own on this computer.
+        instance: name of the daemon's instance, when no endpoint is given.
+        topics: record classes, or topics by name ("position" or "hapticd/position"); all unless given.
+        timeout_s: longest silence while iterating [s]; None: wait for ever.
+        receive_high_water: messages kept while the caller is busy; new ones are lost beyond it.
+
+    Raises:
+        ClientError: no such topic, or ZeroMQ cannot use the endpoint.
+    """
+    return Client(endpoint or telemetry_endpoint(instance), topics, timeout_s, receive_high_water)
+
+
+class Client:
+    """An iterable of records; made by `connect`.
+
+    Records are yielded once the daemon's first status has arrived and its schema is known. Ticks that are
+    missing are yielded as a `Gap`.
+
+    Attributes:
+        endpoint: what it is connected to.
+        status: latest status of the daemon, None before the first, whether or not that topic was asked for.
+        missing: ticks that did not arrive so far, by topic.
+    """
+
+    def __init__(
+        self,
+        endpoint: str,
+        topics: Sequence[type[Sent] | Topic | str],
+        timeout_s: float | None,
+        receive_high_water: int,
+    ) -> None:
+        self.endpoint = endpoint
+        self.status: Status | None = None
+        self.missing: dict[Topic, int] = dict.fromkeys(_EVERY_TICK, 0)
+        self._topics = frozenset(_topic(topic) for topic in topics)
+        self._timeout_s = timeout_s
+        self._last: dict[Topic, int] = {}
+        self._context = zmq.Context(io_threads=1)
+        self._socket = self._context.socket(zmq.SUB)
+        try:
+            self._socket.setsockopt(zmq.LINGER, 0)
+            self._socket.setsockopt(zmq.RCVHWM, receive_high_water)
+            self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_MESSAGE)
+            if "[" in endpoint:
+                self._socket.setsockopt(zmq.IPV6, 1)
+            for topic in self._topics | {Topic.STATUS}:
+                self._socket.setsockopt_string(zmq.SUBSCRIBE, topic)
+            self._socket.connect(endpoint)
+        except zmq.ZMQError as error:
+            self.close()
+            raise ClientError(f"{endpoint}: {error.strerror}; an endpoint is ipc://PATH or tcp://HOST:PORT") from error
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Record]:
+        """Every record as it arrives.
+
+        Raises:
+            SilenceError: nothing arrived for `timeout_s`.
+            SchemaError, WireError: as `receive`.
+        """
+        while True:
+            records = self.receive(self._timeout_s)
+            if not records:
+                raise SilenceError(f"{self.endpoint}: nothing for {self._timeout_s:g} s; is the daemon running there?")
+            yield from records
+
+    def receive(self, timeout_s: float | None = 0.0) -> list[Record]:
+        """The records of the next message that has some; empty when none came in time.
+
+        Args:
+            timeout_s: how long to wait for it [s]; None: for ever.
+
+        Raises:
+            SchemaError: the daemon's schema is not known to this client.
+            WireError: somebody sends what the contract does not allow.
+        """
+        until = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            left_s = until - time.monotonic()
+            if not self._socket.poll(None if left_s == math.inf else max(0, math.ceil(left_s * 1000))):
+                return []
+            records = self._accept(self._socket.recv_multipart())
+            if records:
+                return records
+
+    def close(self) -> None:
+        """Disconnect. May be called twice."""
+        self._socket.close(linger=0)
+        self._context.term()
+
+    def _accept(self, frames: list[bytes]) -> list[Record]:
+        if len(frames) != 2:
+            raise WireError(f"{self.endpoint}: a message of {len(frames)} frames, not topic and payload")
+        records = decode(*frames)
+        accepted: list[Record] = []
+        for record in records:
+            if isinstance(record, Status):
+                self._learn(record)
+            if self.status is None or record.topic not in self._topics:
+                continue
+            if record.topic in _EVERY_TICK:
+                accepted.extend(self._gap(record.topic, record.seq))
+            accepted.append(record)
+        return accepted
+
+    def _learn(self, status: Status) -> None:
+        if status.schema != SCHEMA:
+            raise SchemaError(
+                f"{self.endpoint}: hapticd {status.version} there speaks schema {status.schema}, this "
+                f"client {SCHEMA}; install the release that the daemon runs"
+            )
+        if self.status is not None and status.every_ticks != self.status.every_ticks:
+            self._last.clear()
+        self.status = status
+
+    def _gap(self, topic: Topic, seq: int) -> list[Gap]:
+        last = self._last.get(topic)
+        self._last[topic] = seq
+        step = self.status.every_ticks if self.status is not None else 1
+        if last is None or seq == last + step:
+            return []
+        missing = max(0, (seq - last) // step - 1) if seq > last else 0
+        if seq > last and missing == 0:
+            return []
+        self.missing[topic] += missing
+        return [Gap(topic, last, seq, missing)]
+
+
+def _topic(topic: type[Any] | Topic | str) -> Topic:
+    name = topic if isinstance(topic, str) else topic.topic
+    try:
+        return Topic(name if "/" in name else f"hapticd/{name}")
+    except ValueError:
+        known = ", ".join(one.removeprefix("hapticd/") for one in Topic)
+        raise ClientError(f"topic {name!r}: not one of {known}") from None

@@ -1,0 +1,133 @@
+"""What the fields of a device are: its options, as the step wants them."""
+
+from __future__ import annotations
+
+import math
+
+from hapticd.simulation.options import (
+    Change,
+    ChirpForce,
+    ConstantForce,
+    PressAndReleaseForce,
+    RampForce,
+    RecordedForce,
+    SimulationOptions,
+    SineForce,
+    StepForce,
+)
+from hapticd.simulation.plant.hand import hand_fields
+from hapticd.simulation.plant.hold import flow
+
+_SWINGS_PER_PERIOD = 10.0
+
+
+def start_state(options: SimulationOptions) -> dict[str, float | int]:
+    """Fields of `PlantState` before the first sample is taken."""
+    seed = options.seed
+    return {
+        "x_m": float(options.initial_position_m),
+        "v_m_per_s": float(options.initial_velocity_m_per_s),
+        "measured_m": 0.0,
+        "applied_n": 0.0,
+        "lag_n": 0.0,
+        "tick": 0,
+        "line_at": 0,
+        "point_at": 0,
+        "noise_a": 1 + seed * 69069 % 2147483562,
+        "noise_b": 1 + (seed * 1664525 + 1013904223) % 2147483398,
+    }
+
+
+def epochs(options: SimulationOptions, period_s: float) -> list[tuple[int, dict[str, float | int]]]:
+    """The parameters from each change on, as (first tick, fields of `PlantParams`); the first is tick 0.
+
+    Raises:
+        ValueError: with Coulomb friction, the spring of the hand swings too fast for the rate.
+    """
+    values = {
+        "mass_kg": options.mass_kg,
+        "viscous_n_s_per_m": options.viscous_n_s_per_m,
+        "coulomb_n": options.coulomb_n,
+        "max_force_n": options.max_force_n,
+        "hand_mass_kg": options.hand.mass_kg,
+        "hand_damping_n_s_per_m": options.hand.damping_n_s_per_m,
+        "hand_stiffness_n_per_m": options.hand.stiffness_n_per_m,
+    }
+    found: dict[int, dict[str, float | int]] = {0: _params(options, values, period_s)}
+    for change in options.changes:
+        values.update(change.values())
+        found[first_tick(change, period_s)] = _params(options, values, period_s)
+    return sorted(found.items())
+
+
+def first_tick(change: Change, period_s: float) -> int:
+    """The first period that starts at or after a change."""
+    return max(0, math.ceil(change.at_s / period_s - 1e-6))
+
+
+def terms(options: SimulationOptions) -> dict[str, bool]:
+    """Which switches of `step` and `hand` a device needs on."""
+    force = options.hand.force
+    timed = not isinstance(force, ConstantForce)
+    return {
+        "DELAY": options.force_delay_samples > 0,
+        "SATURATION": options.max_force_n > 0.0 or any(change.max_force_n for change in options.changes),
+        "LAG": options.bandwidth_hz > 0.0,
+        "HAND": not (isinstance(force, ConstantForce) and force.newton == 0.0),
+        "SPRING": options.hand.stiffness_n_per_m > 0.0 or any(c.hand_stiffness_n_per_m for c in options.changes),
+        "FRICTION": options.coulomb_n > 0.0 or any(change.coulomb_n for change in options.changes),
+        "NOISE": options.noise_m > 0.0,
+        "QUANTISED": options.resolution_m > 0.0,
+        "TIMED": timed,
+        "HAND_STEP": isinstance(force, StepForce),
+        "HAND_RAMP": isinstance(force, RampForce),
+        "HAND_SINE": isinstance(force, SineForce),
+        "HAND_CHIRP": isinstance(force, ChirpForce),
+        "HAND_PRESS": isinstance(force, PressAndReleaseForce),
+        "HAND_RECORDED": isinstance(force, RecordedForce),
+    }
+
+
+def delay_line(options: SimulationOptions) -> list[float]:
+    """An empty delay line."""
+    return [0.0] * (options.force_delay_samples + 1)
+
+
+def _params(options: SimulationOptions, values: dict[str, float], period_s: float) -> dict[str, float | int]:
+    mass_kg = values["mass_kg"] + values["hand_mass_kg"]
+    decay_per_s = (values["viscous_n_s_per_m"] + values["hand_damping_n_s_per_m"]) / mass_kg
+    spring_n_per_m = values["hand_stiffness_n_per_m"]
+    stiffness_per_s2 = spring_n_per_m / mass_kg
+    v_per_v, v_per_a, x_per_a = flow(decay_per_s, stiffness_per_s2, period_s)
+    swing_per_s2 = stiffness_per_s2 - 0.25 * decay_per_s * decay_per_s
+    half_swing_s = math.pi / math.sqrt(swing_per_s2) if swing_per_s2 > 0.0 else math.inf
+    if values["coulomb_n"] > 0.0 and half_swing_s * _SWINGS_PER_PERIOD < period_s:
+        raise ValueError(
+            f"hand.stiffness_n_per_m = {spring_n_per_m:g}: with Coulomb friction the hand may swing at most "
+            f"{_SWINGS_PER_PERIOD / 2:g} times in a period of {period_s:g} s"
+        )
+    lag_keep = lag_mean = 0.0
+    if options.bandwidth_hz > 0.0:
+        ratio = 2.0 * math.pi * options.bandwidth_hz * period_s
+        lag_keep = math.exp(-ratio)
+        lag_mean = -math.expm1(-ratio) / ratio
+    return {
+        "period_s": period_s,
+        "x_per_v": v_per_a,
+        "x_per_f": x_per_a / mass_kg,
+        "v_per_v": v_per_v,
+        "v_per_f": v_per_a / mass_kg,
+        "spring_n_per_m": spring_n_per_m,
+        "mass_kg": mass_kg,
+        "decay_per_s": decay_per_s,
+        "stiffness_per_s2": stiffness_per_s2,
+        "half_swing_s": half_swing_s,
+        "coulomb_n": values["coulomb_n"],
+        "limit_n": values["max_force_n"] or math.inf,
+        "lag_keep": lag_keep,
+        "lag_mean": lag_mean,
+        "delay_samples": options.force_delay_samples,
+        "resolution_m": options.resolution_m,
+        "noise_m": options.noise_m * math.sqrt(3.0),
+        **hand_fields(options),
+    }

@@ -1,0 +1,151 @@
+"""The whole daemon on the fake omega.7, in real time, judged from its telemetry and from what the device says."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hapticd.contracts.event import EventCode
+from tests.daemon.running import Subscriber, wait_until
+from tests.drivers.forcedimension.bench import BRAKE, FORCE, SOFTWARE, WATCHDOG, Bench
+from tests.drivers.forcedimension.lab import PRESS_N, Lab, rest_of
+
+LATE = {EventCode.LOOP_LATE, EventCode.LAW_OVER_BUDGET}
+"""Faults that say that this computer was too busy: they tell nothing of the driver."""
+
+ATTEMPTS = 3
+WINDOW_S = 0.25
+
+
+class BusyError(Exception):
+    """The computer was too busy for a run to count."""
+
+
+def share_held(subscriber: Subscriber, lab: Lab, from_s: float, seconds: float) -> float:
+    """Share of the quarter seconds of some time in which the wall held; a late tick may spoil one.
+
+    Raises:
+        BusyError: the loop was stopped because it was late.
+    """
+    first = round(from_s * lab.rate_hz)
+    ticks = round(WINDOW_S * lab.rate_hz)
+    windows: list[list[float]] = [[] for _ in range(round(seconds / WINDOW_S))]
+    for topic, fields in subscriber.maps():
+        if topic == "hapticd/event":
+            if fields["code"] in LATE:
+                raise BusyError(fields["text"])
+            assert not 200 <= fields["code"] < 300, fields
+            continue
+        at = (fields["seq"] - first) // ticks
+        if at >= len(windows):
+            break
+        if at >= 0:
+            windows[at].append(fields["position_m"][2])
+    held = [bool(window) and rest_of(window).held(lab.stiffness_n_per_m) for window in windows]
+    return sum(held) / len(held)
+
+
+def shares_held(fake_sdk: Path, directory: Path, rate_hz: float, seconds: float) -> list[float]:
+    """How well the three walls held in their last two seconds, and how well the first one does without a law."""
+    walls = [("energy-cycle", 12000.0), ("energy-cycle", 18000.0), ("energy-cycle", 20000.0), ("none", 12000.0)]
+    for attempt in range(ATTEMPTS):
+        with contextlib.ExitStack() as stack, contextlib.suppress(BusyError):
+            labs = [
+                stack.enter_context(Lab(fake_sdk, directory / f"device-{attempt}-{number}", stiffness, rate_hz, law))
+                for number, (law, stiffness) in enumerate(walls)
+            ]
+            subscribers = [
+                stack.enter_context(Subscriber(lab.daemon.endpoint, "hapticd/position", "hapticd/event"))
+                for lab in labs
+            ]
+            return [
+                share_held(subscriber, lab, seconds - 2.0, 2.0)
+                for lab, subscriber in zip(labs, subscribers, strict=True)
+            ]
+    raise AssertionError(f"this computer was too busy {ATTEMPTS} times")
+
+
+@pytest.mark.usefixtures("bench")
+def test_it_holds_the_papers_walls(fake_sdk: Path, tmp_path: Path) -> None:
+    *held, without_law = shares_held(fake_sdk, tmp_path, 1000.0, 5.0)
+    assert min(held) >= 0.75, held
+    assert without_law <= 0.25
+
+
+@pytest.mark.nightly
+@pytest.mark.usefixtures("bench")
+@pytest.mark.parametrize("rate_hz", [1000.0, 4000.0])
+def test_it_holds_the_papers_walls_for_long(fake_sdk: Path, tmp_path: Path, rate_hz: float) -> None:
+    *held, _ = shares_held(fake_sdk, tmp_path, rate_hz, 30.0)
+    assert min(held) >= 0.75, held
+
+
+@pytest.fixture
+def lab(bench: Bench, fake_sdk: Path, tmp_path: Path) -> Iterator[Lab]:
+    assert bench.get("mode") != FORCE
+    with Lab(fake_sdk, tmp_path / "device", 12000.0) as made:
+        wait_until(lambda: made.look().get("force_n", index=2) > 0.5 * PRESS_N, "the wall to push")
+        yield made
+
+
+def test_when_the_computer_goes_silent_the_device_brakes_by_itself(lab: Lab) -> None:
+    """Both processes gone at once, and the helper with them, so that nobody is left to release the device."""
+    os.kill(lab.daemon.process.pid, signal.SIGSTOP)
+    os.kill(lab.daemon.control_pid(), signal.SIGKILL)
+    os.kill(lab.daemon.process.pid, signal.SIGKILL)
+    wait_until(lambda: lab.look().get("mode") == BRAKE, "the device's watchdog")
+    assert lab.look().get("cause") == WATCHDOG
+    assert lab.look().vector("force_n") == [0.0, 0.0, 0.0]
+
+
+def test_when_the_loop_is_killed_the_supervisor_takes_the_force_away(lab: Lab) -> None:
+    os.kill(lab.daemon.control_pid(), signal.SIGKILL)
+    assert lab.daemon.wait_exit() == 1
+    assert lab.look().get("mode") == BRAKE
+    assert lab.look().get("cause") == SOFTWARE
+    assert lab.look().get("holder") == 0
+
+
+def test_when_the_sdk_hangs_the_supervisor_takes_the_force_away(lab: Lab) -> None:
+    lab.look().set(slow_us=60e6, slow_calls=1)
+    assert lab.daemon.wait_exit() == 1
+    assert lab.look().get("mode") == BRAKE
+    assert "the device is without force" in lab.daemon.output()
+
+
+def test_the_force_button_latches_until_somebody_clears_and_arms(lab: Lab) -> None:
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is connected
+        lab.look().set(hand_n=[0.0, 0.0, 0.0])
+        lab.look().press_force_button()
+        fault = subscriber.until("hapticd/event", code=EventCode.DEVICE_FAULT)
+        assert "the force button on the device was pressed" in fault["text"]
+        subscriber.until("hapticd/event", code=EventCode.DEVICE_FOUND)
+        assert lab.look().get("mode") == BRAKE
+        assert "hapticd clear" in lab.ask("arm")
+        assert lab.ask("clear") == ""
+        assert lab.ask("arm") == ""
+        assert lab.look().get("mode") == FORCE
+
+
+def test_an_unplugged_device_comes_back(lab: Lab) -> None:
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is connected
+        lab.look().set(present=0, hand_n=[0.0, 0.0, 0.0])
+        lost = subscriber.until("hapticd/event", code=EventCode.DEVICE_LOST)
+        assert "communication error" in lost["text"]
+        lab.look().set(present=1)
+        subscriber.until("hapticd/event", code=EventCode.DEVICE_FOUND)
+        wait_until(lambda: lab.look().get("mode") == FORCE, "auto_arm to arm it again")
+
+
+def test_sigterm_ramps_out_and_leaves_the_brakes_on(lab: Lab) -> None:
+    lab.daemon.process.terminate()
+    assert lab.daemon.wait_exit() == 0
+    assert lab.look().get("mode") == BRAKE
+    assert lab.look().get("moves") == 0
