@@ -20,7 +20,7 @@ import zmq
 
 from hapticd.contracts.event import EventCode
 from hapticd.faults.store import FaultStore
-from tests.daemon.running import Subscriber, all_records, wait_until
+from tests.daemon.running import Subscriber, all_records, gone, wait_until
 from tests.daemon.test_deaths import nothing_left, pressing
 from tests.faults.rig import Felt, Report, Rig, events_until
 
@@ -220,6 +220,29 @@ def test_a_device_that_hangs_is_released_from_outside_and_the_service_ends(recor
             record, summary = rig.recorded(EventCode.CONTROL_LOST)
             assert (summary.after_s, summary.ticks) == (0.0, len(record.ticks))
             assert summary.ticks > 500
+
+
+def test_a_helper_that_was_killed_is_replaced_when_it_is_needed_and_outlives_nobody() -> None:
+    with contextlib.ExitStack() as stack:
+        first, second = (stack.enter_context(Rig()).pressed() for _ in range(2))
+        with first.subscriber() as subscriber:
+            os.kill(helper_of(first), signal.SIGKILL)
+            os.kill(first.daemon.control_pid(), signal.SIGKILL)
+            event = events_until(subscriber, EventCode.CONTROL_LOST)[-1]
+            assert event["text"].endswith("the device is without force")
+        helper = helper_of(second)
+        second.daemon.process.kill()
+        wait_until(lambda: gone(helper), "the helper to end")
+
+
+def helper_of(rig: Rig) -> int:
+    """The process that stands by to release the device."""
+    for entry in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            if parent == rig.daemon.process.pid and b"hapticd.supervisor.release" in (entry / "cmdline").read_bytes():
+                return int(entry.name)
+    raise AssertionError("there is no helper")
 
 
 def test_a_supervisor_that_stalls_takes_the_force_out(record_property: Report) -> None:

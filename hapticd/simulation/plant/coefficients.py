@@ -1,21 +1,11 @@
-"""What the fields of a device are: its options, as the step wants them."""
+"""A device as the step wants it: fields of its start, its coefficients from each change on, the terms that it needs."""
 
 from __future__ import annotations
 
 import math
 
-from hapticd.simulation.options import (
-    Change,
-    ChirpForce,
-    ConstantForce,
-    PressAndReleaseForce,
-    RampForce,
-    RecordedForce,
-    SimulationOptions,
-    SineForce,
-    StepForce,
-)
-from hapticd.simulation.plant.hand import hand_fields
+from hapticd.simulation.options import Change, SimulationOptions
+from hapticd.simulation.plant.hand import hand_fields, hand_terms
 from hapticd.simulation.plant.hold import flow
 
 _SWINGS_PER_PERIOD = 10.0
@@ -67,24 +57,15 @@ def first_tick(change: Change, period_s: float) -> int:
 
 def terms(options: SimulationOptions) -> dict[str, bool]:
     """Which switches of `step` and `hand` a device needs on."""
-    force = options.hand.force
-    timed = not isinstance(force, ConstantForce)
     return {
         "DELAY": options.force_delay_samples > 0,
         "SATURATION": options.max_force_n > 0.0 or any(change.max_force_n for change in options.changes),
         "LAG": options.bandwidth_hz > 0.0,
-        "HAND": not (isinstance(force, ConstantForce) and force.newton == 0.0),
         "SPRING": options.hand.stiffness_n_per_m > 0.0 or any(c.hand_stiffness_n_per_m for c in options.changes),
         "FRICTION": options.coulomb_n > 0.0 or any(change.coulomb_n for change in options.changes),
         "NOISE": options.noise_m > 0.0,
         "QUANTISED": options.resolution_m > 0.0,
-        "TIMED": timed,
-        "HAND_STEP": isinstance(force, StepForce),
-        "HAND_RAMP": isinstance(force, RampForce),
-        "HAND_SINE": isinstance(force, SineForce),
-        "HAND_CHIRP": isinstance(force, ChirpForce),
-        "HAND_PRESS": isinstance(force, PressAndReleaseForce),
-        "HAND_RECORDED": isinstance(force, RecordedForce),
+        **hand_terms(options),
     }
 
 

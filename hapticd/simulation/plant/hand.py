@@ -95,6 +95,21 @@ def recorded_points(options: SimulationOptions) -> tuple[list[float], list[float
     return [time_s for time_s, _ in force.points], [newton for _, newton in force.points]
 
 
+def hand_terms(options: SimulationOptions) -> dict[str, bool]:
+    """Which switches a hand needs on."""
+    force = options.hand.force
+    return {
+        "HAND": not (isinstance(force, ConstantForce) and force.newton == 0.0),
+        "TIMED": not isinstance(force, ConstantForce),
+        "HAND_STEP": isinstance(force, StepForce),
+        "HAND_RAMP": isinstance(force, RampForce),
+        "HAND_SINE": isinstance(force, SineForce),
+        "HAND_CHIRP": isinstance(force, ChirpForce),
+        "HAND_PRESS": isinstance(force, PressAndReleaseForce),
+        "HAND_RECORDED": isinstance(force, RecordedForce),
+    }
+
+
 def hand_fields(options: SimulationOptions) -> dict[str, float | int]:
     """The fields of `PlantParams` that say what the hand does."""
     force = options.hand.force

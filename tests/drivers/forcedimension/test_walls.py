@@ -1,4 +1,4 @@
-"""The paper's walls through the driver on the fake omega.7, tick by tick: a period passes with each, so one run decides."""
+"""The paper's walls through the driver on the fake omega.7: a period passes with each tick, so one run decides."""
 
 from __future__ import annotations
 
