@@ -20,7 +20,7 @@ OLDEST = (3, 14)
 ADVISED = (3, 16)
 
 _ENVIRONMENT = ("FDSDK", "FORCEDIM_SDK")
-_USUAL = (Path("/usr/local/lib"), Path("~/.local/lib"), Path("/opt/forcedimension"))
+_USUAL = (Path("/usr/local/lib"), Path("~/.local/lib"))
 
 
 class Sdk:
