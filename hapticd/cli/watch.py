@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Annotated
 
 import typer
-from rich.console import CONSOLE_SVG_FORMAT, Console, Group
+from rich.console import Console, Group
 from rich.live import Live
 
 from hapticd.cli.picture import SILENT_S, Known, frame, one_line
@@ -34,7 +34,6 @@ FRAME_S = 0.1
 _PATIENCE_S = 3.0  # for a daemon, when one answer is all that was asked for
 _GATHER_S = 1.0  # what a single picture shows of its traces
 _KEEP_S = 4.0  # what a kept picture shows
-_SVG = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)  # a picture fetches no fonts
 _LOOK_AGAIN_S = 1.0  # a daemon may come up elsewhere than where this one first looked
 _SHOWN = ("position", "energy", "damping", "cycle", "event", "status")
 
@@ -214,8 +213,10 @@ def _keep(feed: _Feed, path: Path) -> None:
         feed.drain(0.05)
     paper = Console(width=80, height=24, record=True, file=io.StringIO(), force_terminal=True, color_system="truecolor")
     paper.print(Group(*frame(feed.known, feed.endpoint, 80, 24, time.monotonic())))
+    # A picture should show the same without a network: no fonts from elsewhere.
+    drawn = re.sub(r"@font-face \{.*?\}\s*", "", paper.export_svg(title="hapticd watch"), flags=re.DOTALL)
     try:
-        paper.save_svg(str(path), title="hapticd watch", code_format=_SVG)
+        path.write_text(drawn)
     except OSError as error:
         raise UnwritableError(f"{path}: {error.strerror}") from error
 

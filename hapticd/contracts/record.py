@@ -7,8 +7,8 @@ The control process writes one record a tick; the supervisor decodes it and publ
 from __future__ import annotations
 
 import enum
-import struct
 from dataclasses import dataclass
+from struct import Struct
 
 
 class Flag(enum.IntFlag):
@@ -116,7 +116,7 @@ class RecordLayout:
         self._structs = [self._struct(walls) for walls in range(max_walls + 1)]
         self.size = self._structs[-1].size
 
-    def struct(self, walls: int) -> struct.Struct:
+    def struct(self, walls: int) -> Struct:
         """The packing of a record with so many walls; unused room behind it is left as it was."""
         return self._structs[walls]
 
@@ -135,8 +135,9 @@ class RecordLayout:
             wall.in_contact = bool(wall.in_contact)
             wall_records.append(wall)
             at += _WALL_FIELDS
-        return TickRecord(*values[: _HEAD_FIELDS - 1], *vectors, tuple(wall_records))
+        fields = (*values[: _HEAD_FIELDS - 1], *vectors, tuple(wall_records))
+        return TickRecord(*fields)
 
-    def _struct(self, walls: int) -> struct.Struct:
+    def _struct(self, walls: int) -> Struct:
         doubles = 4 * self.axes + (9 if self.orientation else 0)
-        return struct.Struct("<" + _HEAD.replace(" ", "") + "d" * doubles + _WALL * walls)
+        return Struct("<" + _HEAD.replace(" ", "") + "d" * doubles + _WALL * walls)
