@@ -23,6 +23,7 @@ COMMANDS: Final = {
     "watch": "Show live what a running daemon measures.",
     "arm": "Let a running daemon apply forces.",
     "disarm": "Ramp the force of a running daemon to zero.",
+    "calibrate": "Calibrate a running daemon's device, which moves its arm.",
     "clear": "Clear the fault that stopped a running daemon.",
     "reload": "Let a running daemon take its edited file over.",
     "fault": "List, show or export the records of faults.",

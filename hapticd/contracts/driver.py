@@ -72,6 +72,25 @@ class DeviceInfo:
         return self.has_clock or self.has_sequence
 
 
+@dataclass(frozen=True, slots=True)
+class FoundDevice:
+    """A device that is there, as `Driver.find` lists it.
+
+    Attributes:
+        model: what it is.
+        serial: its serial number; "" when it has none or could not be asked.
+        where: where it is plugged in, for people; "" when nobody tells.
+        problem: why it cannot be used now; "" when it can.
+        note: what is to be known before it is used; "" when there is nothing.
+    """
+
+    model: str
+    serial: str
+    where: str = ""
+    problem: str = ""
+    note: str = ""
+
+
 class Sample:
     """The newest state of a device; one object, filled anew at each read.
 
@@ -122,6 +141,15 @@ class Driver(ABC, Generic[OptionsT]):
         self._info: DeviceInfo | None = None
         self._limit_squared = 0.0
         self._axes = 0
+
+    @classmethod
+    def find(cls, options: OptionsT | None = None) -> list[FoundDevice]:
+        """Every device of this kind that is there, whether it can be used or not; none is moved or kept open.
+
+        Args:
+            options: what is needed to look for it; None: the defaults.
+        """
+        return []
 
     @property
     def info(self) -> DeviceInfo:

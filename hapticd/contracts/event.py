@@ -17,6 +17,8 @@ class EventCode(enum.IntEnum):
     STOPPING = 105
     REFUSED = 106
     DEVICE_FOUND = 107
+    CALIBRATING = 108
+    CALIBRATED = 109
 
     LAW_FAILED = 200
     LAW_OVER_BUDGET = 201

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from hapticd import registry
 from hapticd.config.models import SafetyConfig, SceneConfig
+from hapticd.contracts.driver import DriverState
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import EventCode
 from hapticd.control.contact import RunningLaw
+from hapticd.guard import Mode
 
 if TYPE_CHECKING:
     from hapticd.control.loop import ControlLoop
@@ -72,6 +74,28 @@ class Letters:
         self._loop.event(EventCode.CLEARED, "fault cleared; the device stays disarmed")
         yield
 
+    def _do_calibrate(self) -> Generator[None, None, None]:
+        """Calibrate beside the loop, which goes on reading; nobody arms meanwhile, since letters wait in line."""
+        loop = self._loop
+        if loop.tick.guard.mode is not Mode.DISARMED or loop.driver.state is not DriverState.OPEN:
+            raise HapticdError("calibration moves the arm by itself: `hapticd disarm` first")
+        loop.event(EventCode.CALIBRATING, "calibrating: the arm moves by itself")
+        ended: list[Exception | None] = []
+
+        def calibrate() -> None:
+            try:
+                loop.driver.calibrate()
+                ended.append(None)
+            except Exception as error:  # noqa: BLE001 - handed over to whoever asked
+                ended.append(error)
+
+        threading.Thread(target=calibrate, daemon=True).start()
+        while not ended:
+            yield
+        if ended[0] is not None:
+            raise ended[0]
+        loop.event(EventCode.CALIBRATED, "calibrated")
+
     def _do_switch(
         self,
         law: str,
@@ -95,6 +119,7 @@ class Letters:
         yield
         make_law = None if keep_law else partial(RunningLaw, module, values)
         tick.switch(new_scene, new_safety, make_law)
+        loop.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
         if not keep_law:
             loop.law_count += 1
         change = f"law {law} goes on" if keep_law else f"law {was} -> {law}"

@@ -70,7 +70,6 @@ class ControlLoop:
         self.tick = tick
         self.shared = shared
         self.loop = loop
-        self.safety = safety
         self.stop_requested = False
         self.law_count = before.law
         self.seq = before.seq
@@ -82,6 +81,7 @@ class ControlLoop:
         self._auto_arm = auto_arm
         self._area = shared.record_area
         self.letters = Letters(self)
+        self.stall_ns = int(safety.supervisor_stall_s * 1e9)
         self._stopping = False
         self._stalled = False
 
@@ -91,12 +91,12 @@ class ControlLoop:
         self.shared.write_event(Event(code, text, self.seq, at_ns, fields))
 
     def arm(self) -> bool:
-        """Enable the device and let forces through; False while latched.
+        """Enable the device and let forces through; False while latched or on the way out.
 
         Raises:
             DriverError: the device refuses.
         """
-        if self.tick.guard.latched:
+        if self.tick.guard.latched or self.stop_requested:
             return False
         self.driver.enable()
         self.tick.arm()
@@ -149,7 +149,6 @@ class ControlLoop:
         thread_time_ns = time.thread_time_ns
         period_ns = self.loop.period_ns
         budget_ns = int(self.loop.law_budget * period_ns)
-        stall_ns = int(self.safety.supervisor_stall_s * 1e9)
         all_ticks = (1 << BUDGET_TICKS) - 1
         most_late = max(BURST_TICKS, int(LATE_S * 1e9) // period_ns)
         misses = 0
@@ -194,10 +193,10 @@ class ControlLoop:
                     driver.disable()
                 if self._stopping:
                     return
-            if words[SUPERVISOR_BEAT] + stall_ns < woke_ns:
+            if words[SUPERVISOR_BEAT] + self.stall_ns < woke_ns:
                 if not self._stalled:
                     self._stalled = True
-                    tick.fail(EventCode.SUPERVISOR_STALLED, f"no sign of the supervisor for {stall_ns * 1e-9:g} s")
+                    tick.fail(EventCode.SUPERVISOR_STALLED, f"no sign of the supervisor for {self.stall_ns * 1e-9:g} s")
             elif self._stalled:
                 self._stalled = False
 

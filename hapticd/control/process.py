@@ -96,6 +96,8 @@ def main() -> int:
         if error.__cause__ is not None:
             traceback.print_exception(error.__cause__)
         return DEVICE_LOST
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd and the supervisor both send one; it is over
     return 0
 
 
@@ -166,14 +168,18 @@ def _installed_laws() -> dict[str, ModuleType]:
 
 
 def _warm_up(tick: ControlTick) -> None:
-    """Run a copy of the tick on a press and a release, so that first calls are behind us."""
+    """Run a copy of the tick on presses and releases of its walls, so that first calls are behind us."""
     sample = Sample(len(tick.info.axes))
+    surface_m = [0.5 * (low + high) for low, high in tick.info.workspace_m]
+    for contact in tick.contacts:
+        surface_m[contact.wall.axis] = contact.wall.position_m
+    sample.position_m[:] = surface_m
     tick.start(sample)
     tick.arm()
     for count in range(WARM_UP_TICKS):
         depth_m = 1e-4 * (count % 20 - 10)
         sample.time_ns = sample.sequence = count + 1
-        sample.position_m[:] = [depth_m] * len(tick.info.axes)
+        sample.position_m[:] = [at + depth_m for at in surface_m]
         tick.step(sample, tick.period_s)
     gc.collect()
 

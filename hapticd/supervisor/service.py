@@ -36,7 +36,7 @@ STOP_TIMEOUT_S = 3.0
 RECORD_TIMEOUT_S = 3.0
 """How long the end of the daemon waits for a fault record that is being written [s]."""
 
-KNOWN = ("status", "arm", "disarm", "clear", "reload", "stop")
+KNOWN = ("status", "arm", "disarm", "calibrate", "clear", "reload", "stop")
 """What the control socket understands."""
 
 
@@ -244,9 +244,9 @@ class Service:
             match request["do"]:
                 case "status":
                     reply(True, status=self.report.status.as_map())
-                case "arm" | "disarm" | "clear" as do if self.recovery.lost:
+                case "arm" | "disarm" | "calibrate" | "clear" as do if self.recovery.lost:
                     self._obey_without_device(do, reply)
-                case "arm" | "disarm" | "clear" as do:
+                case "arm" | "disarm" | "calibrate" | "clear" as do:
                     self.requests.submit({"do": do}, _answering(reply))
                 case "reload" if request.get("wait"):
                     self.reload(_answering(reply))
@@ -261,8 +261,8 @@ class Service:
 
     def _obey_without_device(self, do: str, reply: Reply) -> None:
         match do:
-            case "arm":
-                reply(False, f"there is no device to arm: {self.recovery.why}")
+            case "arm" | "calibrate":
+                reply(False, f"there is no device to {do}: {self.recovery.why}")
             case "disarm":
                 self.recovery.amend(replace(self.recovery.before, may_arm=False))
                 self._tell_now(EventCode.DISARMED, "the device stays disarmed when it is back")

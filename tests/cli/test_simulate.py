@@ -24,7 +24,7 @@ from tests.daemon.running import Daemon, all_records, wait_until
 
 HAPTICD = Path(sys.executable).with_name("hapticd")
 CONFIG = directory("config")
-SHIPPED = sorted(CONFIG.glob("*.toml"))
+SHIPPED = sorted(file for file in CONFIG.glob("*.toml") if file.stem != "omega7")  # that one needs its device
 WALL_12 = CONFIG / "wall-12-energy-cycle.toml"
 DIVERGING = """
 [device.options]

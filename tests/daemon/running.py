@@ -99,7 +99,7 @@ class Daemon:
         """The control process's shared memory, which outlives it while we hold it."""
         pid = self.control_pid()
         for link in Path(f"/proc/{pid}/fd").iterdir():
-            if "memfd:hapticd" in str(link.readlink()):
+            if str(link.readlink()) == "/memfd:hapticd (deleted)":
                 layout = RecordLayout(1, False, 8)
                 return SharedMemory(layout, 1000.0, os.open(link, os.O_RDWR | os.O_CLOEXEC))
         raise AssertionError("the control process has no shared memory")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import usb.core
 
+from hapticd.contracts.driver import FoundDevice
 from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, DriverError, PluginError
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.models import FALCON_TYPE, MODELS
@@ -15,25 +16,6 @@ from hapticd_drivers.forcedimension.sdk import Sdk
 
 _in_use: set[int] = set()
 """IDs that drivers of this process have open: the SDK gives them again to whoever opens the same device."""
-
-
-@dataclass(frozen=True, slots=True)
-class FoundDevice:
-    """A device that is there.
-
-    Attributes:
-        model: what it is.
-        serial: its serial number; "" when it could not be asked.
-        where: place on USB, `001:005`; "" when the SDK has found it, which does not tell.
-        problem: why it cannot be used now; "" when it can.
-        note: what is to be known before it is used; "" when there is nothing.
-    """
-
-    model: str
-    serial: str
-    where: str = ""
-    problem: str = ""
-    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,9 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 
-from hapticd.contracts.driver import DeviceInfo, Driver, DriverState, Sample
+from hapticd.contracts.driver import DeviceInfo, Driver, DriverState, FoundDevice, Sample
 from hapticd.contracts.errors import ConfigError, DeviceFaultError, DriverStateError, PluginError
 from hapticd_drivers.forcedimension import discovery, presence, settings
-from hapticd_drivers.forcedimension.discovery import FoundDevice
 from hapticd_drivers.forcedimension.failures import TIMEOUT, cause_of
 from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ
 from hapticd_drivers.forcedimension.options import ForceDimensionOptions

@@ -155,3 +155,23 @@ def test_sigterm_ramps_out_and_leaves_the_brakes_on(lab: Lab) -> None:
     assert lab.daemon.wait_exit() == 0
     assert lab.look().get("mode") == BRAKE
     assert lab.look().get("moves") == 0
+
+
+def test_calibration_moves_the_arm_once_it_is_disarmed_and_the_loop_goes_on(lab: Lab) -> None:
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/position") as subscriber:
+        next(subscriber.maps())
+        assert "hapticd disarm" in lab.ask("calibrate")
+        assert lab.look().get("moves") == 0
+        lab.look().set(hand_n=[0.0, 0.0, 0.0], auto_init_us=300_000)
+        assert lab.ask("disarm") == ""
+        wait_until(lambda: lab.look().get("mode") == BRAKE, "the ramp to end")
+        lab.look().set(calibrated=0)
+        assert "not been calibrated" in lab.ask("arm")
+        before = subscriber.until("hapticd/position")["seq"]
+        assert lab.ask("calibrate") == ""
+        begun = subscriber.until("hapticd/event", code=EventCode.CALIBRATING)["seq"]
+        ended = subscriber.until("hapticd/event", code=EventCode.CALIBRATED)["seq"]
+        assert before < begun < ended - 100
+        assert (lab.look().get("moves"), lab.look().get("mode")) == (1, BRAKE)
+        assert lab.ask("arm") == ""
+        assert lab.look().get("mode") == FORCE

@@ -1,0 +1,32 @@
+"""`hapticd calibrate`."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+import typer
+
+from hapticd.commander import command
+from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
+
+TIMEOUT_S = 120.0
+"""How long the device may take [s]."""
+
+
+def calibrate(
+    instance: Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.")] = DEFAULT_INSTANCE,
+    countdown_s: Annotated[int, typer.Option("--countdown", min=0, max=60, help="Seconds to clear the workspace.")] = 5,
+) -> None:
+    """Calibrate a running daemon's device, which moves its arm.
+
+    Let go of the arm and clear its workspace. Ctrl-C during the countdown calls it off. The daemon must be disarmed,
+    and goes on streaming positions.
+
+    Example: hapticd calibrate --countdown 10
+    """
+    for left_s in range(countdown_s, 0, -1):
+        typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
+        time.sleep(1.0)
+    typer.echo("calibrating", err=True)
+    command("calibrate", instance, TIMEOUT_S)
