@@ -89,16 +89,6 @@ class SharedMemory:
         self.view[start + 8 : start + 8 + len(row)] = row
         self.words[EVENTS] += 1
 
-    def read_events(self, seen: int) -> list[Event]:
-        """Events after the first `seen` (supervisor side); of more than fit, the newest."""
-        events = []
-        written = self.words[EVENTS]
-        for number in range(max(seen, written - _EVENT_SLOTS), written):
-            start = _EVENTS + number % _EVENT_SLOTS * _EVENT_SIZE
-            length = int.from_bytes(self.view[start : start + 8], "little")
-            events.append(Event(*msgpack.unpackb(self.view[start + 8 : start + 8 + length])))
-        return events
-
     def post(self, letter: dict[str, Any]) -> int:
         """Send a letter to the loop (supervisor side); returns its number.
 

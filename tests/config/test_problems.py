@@ -95,7 +95,7 @@ EXAMPLES = {
         'controller.law = "json.decoder": law json.decoder: has no `Params` (a law needs Params, State, start, step)'
     ),
     "[device.options]\nmas_kg = 1": 'device.options.mas_kg = 1: unknown key; did you mean "mass_kg"?',
-    "[device.options]\nmass_kg = 0": "device.options.mass_kg = 0: must be more than 1e-9 and at most 1e6 kg",
+    "[device.options]\nmass_kg = 0": "device.options.mass_kg = 0: must be from 1e-9 to 1e6 kg",
     "[device.options]\nchanges = [{ at_s = 1, mas_kg = 1, mass_kg = 2 }]": (
         'device.options.changes[0].mas_kg = 1: unknown key; did you mean "mass_kg"?'
     ),
