@@ -114,7 +114,7 @@ def test_a_lost_device_is_without_force_and_comes_back_disarmed(record_property:
             events = events_until(subscribers[order], EventCode.DEVICE_LOST)
             assert faults(events) == [EventCode.DEVICE_LOST], order
             felt = rig.released()
-            record_property(order, felt)
+            record_property(order, str(felt))
             assert felt.writes <= 1, order
             assert felt.peak_n <= LIMIT_N
             status = subscribers[order].until("hapticd/status", armed=False)
