@@ -7,6 +7,7 @@ the right place when its mean depth is that of the spring, F / k, within 10 % or
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -72,18 +73,23 @@ def run(starts: Sequence[Start]) -> list[Rest]:
 def _run_at_once(starts: Sequence[Start]) -> list[Rest]:
     rests = []
     with contextlib.ExitStack() as stack:
-        daemons = [stack.enter_context(Daemon(start.config)) for start in starts]
+        # Loops of one priority on one processor wait for each other: spread them, as a user with several devices would.
+        cpus = sorted(os.sched_getaffinity(0))
+        daemons = [
+            stack.enter_context(Daemon(f"[loop]\ncpu = {cpus[at % len(cpus)]}\n" + start.config))
+            for at, start in enumerate(starts)
+        ]
         subscribers = [
             stack.enter_context(Subscriber(daemon.wait_ready().endpoint, "hapticd/position")) for daemon in daemons
         ]
-        for start, subscriber in zip(starts, subscribers, strict=True):
+        for start, daemon, subscriber in zip(starts, daemons, subscribers, strict=True):
             positions = []
             for _, fields in subscriber.maps():
                 if fields["seq"] >= RUN_TICKS - LAST_TICKS:
                     positions.append(fields["position_m"][0])
                 if len(positions) == LAST_TICKS:
                     break
-            assert len(positions) == LAST_TICKS
+            assert len(positions) == LAST_TICKS, daemon.output()
             depth_m = start.press_n / start.stiffness_n_per_m
             mean_m = sum(positions) / len(positions)
             rests.append(Rest(start, max(positions) - min(positions), abs(mean_m + depth_m)))
