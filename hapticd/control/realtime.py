@@ -6,7 +6,6 @@ class changes last.
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import gc
 import os
@@ -86,8 +85,6 @@ def make_sleeper() -> Callable[[int], None]:
         while nanosleep(_CLOCK_MONOTONIC, _TIMER_ABSTIME, address, None):
             pass
 
-    # The array must outlive the address.
-    sleep_until.timespec = timespec  # type: ignore[attr-defined]
     return sleep_until
 
 
@@ -97,10 +94,9 @@ def _hold_latency() -> list[str]:
     if _latency_hold is not None:
         return []
     try:
-        _latency_hold = os.open("/dev/cpu_dma_latency", os.O_RDWR | os.O_CLOEXEC)
-        os.write(_latency_hold, struct.pack("i", 0))
+        descriptor = os.open("/dev/cpu_dma_latency", os.O_RDWR | os.O_CLOEXEC)
+        os.write(descriptor, struct.pack("i", 0))
     except OSError as error:
-        with contextlib.suppress(OSError, TypeError):
-            os.close(_latency_hold)  # type: ignore[arg-type]
         return [f"/dev/cpu_dma_latency: {error.strerror}; deep idle makes the loop later"]
+    _latency_hold = descriptor
     return []
