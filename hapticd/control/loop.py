@@ -48,7 +48,7 @@ class ControlLoop:
         loop: the [loop] table.
         safety: the [safety] table.
         auto_arm: arm as soon as the loop runs.
-        sleep_until: sleeps to a CLOCK_MONOTONIC time [ns].
+        sleep_until: sleeps to a CLOCK_MONOTONIC time and returns when it woke [ns].
         before: where the loop before stopped, when this one goes on for it.
 
     Attributes:
@@ -63,7 +63,7 @@ class ControlLoop:
         loop: LoopConfig,
         safety: SafetyConfig,
         auto_arm: bool,
-        sleep_until: Callable[[int], None],
+        sleep_until: Callable[[int], int],
         before: Predecessor = NOBODY,
     ) -> None:
         self.driver = driver
@@ -162,8 +162,7 @@ class ControlLoop:
         last_ns = deadline_ns - period_ns
         cpu_ns = thread_time_ns()
         while True:
-            sleep_until(deadline_ns)
-            woke_ns = monotonic_ns()
+            woke_ns = sleep_until(deadline_ns)
             self._deadline_ns = deadline_ns
 
             try:

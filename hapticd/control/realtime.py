@@ -11,6 +11,7 @@ import gc
 import os
 import signal
 import struct
+import time
 from collections.abc import Callable
 
 from hapticd.config.models import LoopConfig
@@ -73,17 +74,20 @@ def become_realtime(config: LoopConfig) -> tuple[list[str], list[str]]:
     return problems, advice
 
 
-def make_sleeper() -> Callable[[int], None]:
-    """A function that sleeps until a CLOCK_MONOTONIC time in nanoseconds; signals do not cut it short."""
+def make_sleeper() -> Callable[[int], int]:
+    """A function that sleeps until a CLOCK_MONOTONIC time and returns when it woke [ns]; no signal cuts it short."""
     nanosleep = _libc.clock_nanosleep
     nanosleep.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
     timespec = (ctypes.c_int64 * 2)()
     address = ctypes.addressof(timespec)
 
-    def sleep_until(deadline_ns: int) -> None:
+    monotonic_ns = time.monotonic_ns
+
+    def sleep_until(deadline_ns: int) -> int:
         timespec[0], timespec[1] = divmod(deadline_ns, 1_000_000_000)
         while nanosleep(_CLOCK_MONOTONIC, _TIMER_ABSTIME, address, None):
             pass
+        return monotonic_ns()
 
     return sleep_until
 

@@ -25,10 +25,10 @@ _FOREVER_NS = 10**15
 
 def stopwatch(
     spent_ns: array[int],
-    sleep_until: Callable[[int], None] | None,
+    sleep_until: Callable[[int], int] | None,
     stop: Callable[[], None],
     now_ns: Callable[[], int] = time.monotonic_ns,
-) -> Callable[[int], None]:
+) -> Callable[[int], int]:
     """A sleep for the loop that takes the time of everything between two sleeps.
 
     Args:
@@ -41,7 +41,7 @@ def stopwatch(
     last = len(spent_ns) - 1
     woke_ns = 0
 
-    def sleep(deadline_ns: int) -> None:
+    def sleep(deadline_ns: int) -> int:
         nonlocal count, woke_ns
         body_ns = now_ns() - woke_ns
         if 0 <= count <= last:
@@ -52,6 +52,7 @@ def stopwatch(
         if sleep_until is not None:
             sleep_until(deadline_ns)
         woke_ns = now_ns()
+        return woke_ns
 
     return sleep
 
@@ -59,7 +60,7 @@ def stopwatch(
 def run_loop(
     config: LoadedConfig,
     spent: array[int],
-    sleep_until: Callable[[int], None] | None,
+    sleep_until: Callable[[int], int] | None,
     pieces: dict[str, list[int]],
 ) -> None:
     """Run the real loop on the configuration's device until `spent` is full."""
@@ -92,7 +93,7 @@ def run_loop(
         shared.close()
 
 
-def run_reference(work: Callable[[], Any], spent: array[int], sleep_until: Callable[[int], None] | None) -> None:
+def run_reference(work: Callable[[], Any], spent: array[int], sleep_until: Callable[[int], int] | None) -> None:
     """Run a loop of the same form with other work until `spent` is full."""
     sleep = stopwatch(spent, sleep_until, _end_block)
     period_ns = round(1e9 / RATE_HZ)
@@ -138,14 +139,15 @@ def _end_block() -> None:
     raise _Full
 
 
-def _also(sleep: Callable[[int], None], pieces: dict[str, list[int]]) -> Callable[[int], None]:
+def _also(sleep: Callable[[int], int], pieces: dict[str, list[int]]) -> Callable[[int], int]:
     """The same sleep; where pieces are timed, an empty function is timed after it."""
     if not pieces:
         return sleep
     idle = timed(nothing, pieces["nothing"])
 
-    def both(deadline_ns: int) -> None:
-        sleep(deadline_ns)
+    def both(deadline_ns: int) -> int:
+        woke_ns = sleep(deadline_ns)
         idle()
+        return woke_ns
 
     return both

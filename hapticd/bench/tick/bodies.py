@@ -113,7 +113,7 @@ class _Samples:
         self.pieces: dict[str, list[int]] = {name: [] for name in _PIECES} if case.pieces else {}
         self.problem = ""
 
-    def run(self, ticks: int, sleep_until: Callable[[int], None] | None) -> None:
+    def run(self, ticks: int, sleep_until: Callable[[int], int] | None) -> None:
         """Measure one more block."""
         if self.problem:
             return
