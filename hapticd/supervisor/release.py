@@ -2,7 +2,9 @@
 
 A process of its own, so that a driver that hangs cannot hang the supervisor. It stands by from the start with
 everything imported, since the device holds its last force until it is released, and the start of an interpreter would
-be most of that time. It reads one byte from its standard input: one means release, none that it is not needed.
+be most of that time. A byte on its standard output says that it stands by; it then reads one from its standard input:
+one means release, none that it is not needed. Where the loop is a real-time process so is this, so that a computer
+with more work than processors does not make it late.
 """
 
 from __future__ import annotations
@@ -10,12 +12,17 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import select
 import signal
 import subprocess
 import sys
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.contracts.errors import HapticdError
+from hapticd.control.realtime import become_realtime
+
+READY_TIMEOUT_S = 10.0
+"""How long the helper may take to import what it needs [s]."""
 
 TIMEOUT_S = 2.0
 """How long the device may take to let go [s]."""
@@ -31,6 +38,17 @@ class Release:
     def __init__(self, config: LoadedConfig) -> None:
         self._config = config
         self._helper = _start(config)
+        self._ready = False
+
+    def wait_ready(self) -> bool:
+        """Return when the helper stands by, or False when it does not get there."""
+        output = self._helper.stdout
+        assert output is not None
+        if not self._ready:
+            waiting = select.poll()
+            waiting.register(output, select.POLLIN)
+            self._ready = bool(waiting.poll(READY_TIMEOUT_S * 1e3)) and bool(output.read(1))
+        return self._ready
 
     def release(self) -> str:
         """Open the device in the helper and disable it.
@@ -40,7 +58,9 @@ class Release:
         """
         if self._helper.poll() is not None:  # somebody has killed it
             self.close()
-            self._helper = _start(self._config)
+            self._helper, self._ready = _start(self._config), False
+        if not self.wait_ready():
+            return "the helper that takes the force away did not start; the device's own watchdog has to release it"
         try:
             _, said = self._helper.communicate(b"!", TIMEOUT_S)
         except subprocess.TimeoutExpired:
@@ -62,9 +82,10 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
             [sys.executable, "-m", "hapticd.supervisor.release", "--config", str(file.fileno())],
             stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             pass_fds=[file.fileno()],
+            bufsize=0,
             start_new_session=True,
         )
 
@@ -78,7 +99,10 @@ def main() -> int:
     try:
         with os.fdopen(arguments.config, "rb") as file:
             config = parse(file.read().decode(), "configuration")
-        driver = config.driver(config.options, config.config.loop.period_s)
+        loop = config.config.loop
+        driver = config.driver(config.options, loop.period_s)
+        become_realtime(loop.model_copy(update={"realtime": "off" if loop.realtime == "off" else "preferred"}))
+        os.write(sys.stdout.fileno(), b"r")
         if not sys.stdin.buffer.read(1):
             return 0
         driver.open()

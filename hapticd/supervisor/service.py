@@ -67,10 +67,11 @@ class Service:
         with contextlib.ExitStack() as undo:
             self.lock = InstanceLock(instance)
             undo.callback(self.lock.close)
-            self.control = Start(config).wait()
-            undo.callback(self._end_control)
             self.release = Release(config)
             undo.callback(self.release.close)
+            self.control = Start(config).wait()
+            undo.callback(self._end_control)
+            self.release.wait_ready()
             self.publisher = Publisher(
                 config.config.telemetry, self.lock.directory / TELEMETRY, self.control.info, offset_ns
             )

@@ -153,7 +153,8 @@ def test_an_endless_law_is_a_stalled_control_process(tmp_path: Path) -> None:
     package.mkdir()
     (package / "__init__.py").touch()
     (package / "endless.py").write_text(ENDLESS_LAW)
-    config = PRESSED + '[controller]\nlaw = "mylab.endless"\n'
+    # At normal priority: an endless real-time process would hold up the loops of the tests beside this one.
+    config = PRESSED + '[loop]\nrealtime = "off"\n[controller]\nlaw = "mylab.endless"\n'
     with Daemon(config, pythonpath=tmp_path) as daemon:
         assert daemon.wait_exit() == 1
         assert "stood still" in daemon.output()

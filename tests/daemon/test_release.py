@@ -1,0 +1,44 @@
+"""The helper that takes the force away from outside, on its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hapticd.config.loading import parse
+from hapticd.supervisor.release import TIMEOUT_S, Release
+
+CONFIG = '[loop]\nrealtime = "off"\n[device]\ndriver = "loopback"\n'
+
+
+@pytest.fixture
+def release() -> Iterator[Release]:
+    helper = Release(parse(CONFIG, "lab.toml"))
+    yield helper
+    helper.close()
+
+
+def test_a_helper_that_is_slow_to_start_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy computer the imports take longer than a device may; the device's time begins after them."""
+    (tmp_path / "sitecustomize.py").write_text(f"import time\ntime.sleep({TIMEOUT_S + 1.0})\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    helper = Release(parse(CONFIG, "lab.toml"))
+    assert helper.release() == "the device is without force"
+    helper.close()
+
+
+def test_a_helper_that_somebody_killed_is_replaced(release: Release) -> None:
+    assert release.wait_ready()
+    os.kill(release._helper.pid, signal.SIGKILL)
+    release._helper.wait()
+    assert release.release() == "the device is without force"
+
+
+def test_a_helper_that_cannot_start_is_told(release: Release, monkeypatch: pytest.MonkeyPatch) -> None:
+    release.close()
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    assert "did not start" in release.release()
