@@ -25,7 +25,7 @@ NEW_CONTACT_KEEP, NEW_CONTACT_ENERGY, NEW_CONTACT_DAMPING = range(3)
 STORED_ENERGY_KEPT, STORED_ENERGY_SUBTRACTED = range(2)
 CAP_FELT_MASS, CAP_KNOWN_MASS, CAP_FIXED, CAP_NONE = range(4)
 
-LIMIT = 1e12  # nothing that is summed or returned grows beyond this, in SI units: so nothing overflows
+LIMIT = 1e12  # a quotient that is kept grows no further, in SI units; what is only summed cannot overflow
 TINY_MOTION = 1e-24  # a cycle with less sum of v^2 dt [m^2/s] is rest: there is nothing to divide by
 FELT_SAMPLES = 20.0  # effective samples before an identified mass is believed
 LEAST_PUSH = 0.005  # negative friction beyond this share of mass / dt is a force one sample late, not an active device
@@ -178,7 +178,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
     ended = cycle_ended(state, state.energy_j, inside, params.window, future)  # eq. 10
     if state.window_rises == 0 and (not ended or state.window_minimum_j == state.energy_j):
         state.candidate_motion_m2_per_s = state.motion_m2_per_s
-        state.candidate_stored_j = 0.5 * abs(_bounded(tick.x_m) * _bounded(tick.contact_n))
+        state.candidate_stored_j = 0.5 * abs(tick.x_m * tick.contact_n)
     if ended:
         if state.count >= FELT_SAMPLES:
             _believe(state, params)
@@ -191,7 +191,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
         state.damping_n_s_per_m = -cap
     if not tick.in_contact:
         return 0.0
-    force_n: float = tick.contact_n - _bounded(state.damping_n_s_per_m * _bounded(tick.velocity_m_per_s))  # eq. 9
+    force_n: float = tick.contact_n - state.damping_n_s_per_m * tick.velocity_m_per_s  # eq. 9
     if force_n < 0.0 and not params.wall_may_pull:
         force_n = 0.0
     return force_n
@@ -199,27 +199,27 @@ def step(state: Any, params: Any, tick: Any) -> float:
 
 def _count_energy(state: Any, params: Any, tick: Any) -> None:
     """E(n) = E(n-1) - F(n-1) (x(n) - x(n-1)) or another reading of it, eq. 8's sum, and how far the cycle travels."""
-    velocity = _bounded(tick.velocity_m_per_s)
+    velocity = tick.velocity_m_per_s
     if params.pairing == PAIRING_EXACT or params.pairing == PAIRING_HELD_POWER:
-        held_n = _bounded(tick.applied_contact_n if params.work == WORK_SPRING else tick.applied_n)
+        held_n = tick.applied_contact_n if params.work == WORK_SPRING else tick.applied_n
         work_n = state.last_work_n if state.forces_late else held_n
         state.last_work_n = held_n
     else:
-        work_n = _bounded(tick.contact_n)
+        work_n = tick.contact_n
         if params.work == WORK_TOTAL and tick.in_contact:
-            work_n = _bounded(work_n - state.damping_n_s_per_m * velocity)
+            work_n = work_n - state.damping_n_s_per_m * velocity
     if params.pairing == PAIRING_EXACT or params.pairing == PAIRING_NEW_FORCE:
-        moved_m = _bounded(tick.moved_m)
+        moved_m = tick.moved_m
     else:
-        moved_m = _bounded(velocity * tick.dt_s)
-    state.energy_j = _bounded(state.energy_j - work_n * moved_m)
+        moved_m = velocity * tick.dt_s
+    state.energy_j -= work_n * moved_m
     if tick.in_contact:
-        if tick.dt_s > 0.0:
-            state.motion_m2_per_s = _bounded(state.motion_m2_per_s + velocity * velocity * tick.dt_s)
-        if tick.x_m < state.lowest_m:
-            state.lowest_m = tick.x_m
-        if tick.x_m > state.highest_m:
-            state.highest_m = tick.x_m
+        state.motion_m2_per_s += velocity * velocity * tick.dt_s
+        x_m = tick.x_m
+        if x_m < state.lowest_m:
+            state.lowest_m = x_m
+        if x_m > state.highest_m:
+            state.highest_m = x_m
 
 
 def _end_cycle(state: Any, params: Any, tick: Any) -> None:
@@ -253,18 +253,17 @@ def _end_cycle(state: Any, params: Any, tick: Any) -> None:
 
 def _cap(state: Any, params: Any, tick: Any) -> float:
     """Largest damping now: on a mass m a sampled damper is itself unstable from 2 m/dt, one sample late 0.83 m/dt."""
-    if tick.dt_s > 0.0:
-        if state.period_s == 0.0:
-            state.period_s = _bounded(tick.dt_s)
-        state.period_s += 0.01 * (_bounded(tick.dt_s) - state.period_s)
+    if state.period_s == 0.0:
+        state.period_s = tick.dt_s
+    state.period_s += 0.01 * (tick.dt_s - state.period_s)
     cap: float = params.cap_damping_n_s_per_m
     if params.cap == CAP_NONE:
         cap = LIMIT
-    elif params.cap != CAP_FIXED and state.period_s > 0.0:
+    elif params.cap != CAP_FIXED:
         mass_kg = params.mass_kg if params.cap == CAP_KNOWN_MASS else state.felt_mass_kg
         if mass_kg > 0.0:
             share = params.late_cap_share if state.forces_late else params.cap_share
-            cap = _bounded(share * mass_kg / state.period_s)
+            cap = share * mass_kg / state.period_s
     return cap
 
 
@@ -279,15 +278,18 @@ def _feel(state: Any, params: Any, tick: Any) -> None:
     so that a plane through (u, s, w) has the slope 1/m along u; the hand's slow force is its intercept. A second
     plane, over forces one sample older, tells the delay: the one that explains more of w is believed.
     """
-    applied_n = _bounded(tick.applied_n)
-    moved_m = _bounded(tick.moved_m)
-    dt_s = _bounded(tick.dt_s)
-    seen = applied_n != 0.0 and state.last_applied_n != 0.0 and state.older_applied_n != 0.0
-    if seen and dt_s > 0.0 and state.last_dt_s > 0.0 and abs(moved_m) > FELT_COUNTS * tick.resolution_m:
-        w = _bounded(_bounded(moved_m / dt_s) - _bounded(state.last_moved_m / state.last_dt_s))
-        s = 0.5 * (moved_m + state.last_moved_m)
-        u = _bounded(0.5 * (applied_n * dt_s + state.last_applied_n * state.last_dt_s))
-        late_u = _bounded(0.5 * (state.last_applied_n * dt_s + state.older_applied_n * state.last_dt_s))
+    applied_n = tick.applied_n
+    last_n = state.last_applied_n
+    moved_m = tick.moved_m
+    dt_s = tick.dt_s
+    seen = applied_n != 0.0 and last_n != 0.0 and state.older_applied_n != 0.0
+    if seen and abs(moved_m) > FELT_COUNTS * tick.resolution_m:
+        last_moved_m = state.last_moved_m
+        last_dt_s = state.last_dt_s
+        w = moved_m / dt_s - last_moved_m / last_dt_s
+        s = 0.5 * (moved_m + last_moved_m)
+        u = 0.5 * (applied_n * dt_s + last_n * last_dt_s)
+        late_u = 0.5 * (last_n * dt_s + state.older_applied_n * last_dt_s)
         keep = params.felt_mass_memory
         state.count = keep * state.count + 1.0
         state.sum_w = keep * state.sum_w + w
@@ -304,7 +306,7 @@ def _feel(state: Any, params: Any, tick: Any) -> None:
         state.late_sum_uw = keep * state.late_sum_uw + late_u * w
     state.last_moved_m = moved_m
     state.last_dt_s = dt_s
-    state.older_applied_n = state.last_applied_n
+    state.older_applied_n = last_n
     state.last_applied_n = applied_n
 
 

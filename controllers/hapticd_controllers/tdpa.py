@@ -60,15 +60,15 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
 
 def step(state: Any, params: Any, tick: Any) -> float:
     """The contact's own force plus just enough damping to pay the energy debt.  -> force on the device [N]."""
-    velocity = _bounded(tick.velocity_m_per_s)
+    velocity = tick.velocity_m_per_s
     if not params.carry_debt and state.energy_j < 0.0:
         state.energy_j = 0.0
     if params.observer == OBSERVER_EXACT:
-        flow_j = -_bounded(tick.applied_n) * _bounded(tick.moved_m)  # E(n) = E(n-1) - F(n-1) (x(n) - x(n-1))
+        flow_j = -tick.applied_n * tick.moved_m  # E(n) = E(n-1) - F(n-1) (x(n) - x(n-1))
     else:  # W(n) = W(n-1) + f(n) v(n) + alpha(n-1) v(n-1)^2
         paid_w = state.damping_n_s_per_m * state.speed_m_per_s * state.speed_m_per_s
-        flow_j = (paid_w - _bounded(tick.contact_n) * velocity) * tick.dt_s
-    state.energy_j = _bounded(state.energy_j + flow_j)
+        flow_j = (paid_w - tick.contact_n * velocity) * tick.dt_s
+    state.energy_j += flow_j
     state.speed_m_per_s = abs(velocity)
     state.damping_n_s_per_m = 0.0
     if not tick.in_contact:
@@ -82,7 +82,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
         if params.damping_cap_n_s_per_m > 0.0 and damping > params.damping_cap_n_s_per_m:
             damping = params.damping_cap_n_s_per_m
         state.damping_n_s_per_m = damping
-        force_n -= _bounded(damping * velocity)
+        force_n -= damping * velocity
     return force_n
 
 

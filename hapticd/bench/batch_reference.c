@@ -72,15 +72,15 @@ static inline void begin(law_state *s, double energy) {
 }
 
 static inline void feel(law_state *s, const law_params *p, const law_tick *t) {
-    double applied = bounded(t->applied_n);
-    double moved = bounded(t->moved_m);
-    double dt = bounded(t->dt_s);
+    double applied = t->applied_n;
+    double moved = t->moved_m;
+    double dt = t->dt_s;
     bool seen = applied != 0.0 && s->last_applied_n != 0.0 && s->older_applied_n != 0.0;
-    if (seen && dt > 0.0 && s->last_dt_s > 0.0 && fabs(moved) > FELT_COUNTS * t->resolution_m) {
-        double w = bounded(bounded(moved / dt) - bounded(s->last_moved_m / s->last_dt_s));
+    if (seen && fabs(moved) > FELT_COUNTS * t->resolution_m) {
+        double w = moved / dt - s->last_moved_m / s->last_dt_s;
         double mean = 0.5 * (moved + s->last_moved_m);
-        double u = bounded(0.5 * (applied * dt + s->last_applied_n * s->last_dt_s));
-        double late_u = bounded(0.5 * (s->last_applied_n * dt + s->older_applied_n * s->last_dt_s));
+        double u = 0.5 * (applied * dt + s->last_applied_n * s->last_dt_s);
+        double late_u = 0.5 * (s->last_applied_n * dt + s->older_applied_n * s->last_dt_s);
         double keep = p->felt_mass_memory;
         s->count = keep * s->count + 1.0;
         s->sum_w = keep * s->sum_w + w;
@@ -139,25 +139,25 @@ static inline void believe(law_state *s, const law_params *p) {
 }
 
 static inline void count_energy(law_state *s, const law_params *p, const law_tick *t) {
-    double velocity = bounded(t->velocity_m_per_s);
+    double velocity = t->velocity_m_per_s;
     double work;
     if (p->pairing == PAIRING_EXACT || p->pairing == PAIRING_HELD_POWER) {
-        double held = bounded(p->work == WORK_SPRING ? t->applied_contact_n : t->applied_n);
+        double held = p->work == WORK_SPRING ? t->applied_contact_n : t->applied_n;
         work = s->forces_late ? s->last_work_n : held;
         s->last_work_n = held;
     } else {
-        work = bounded(t->contact_n);
-        if (p->work == WORK_TOTAL && t->in_contact) work = bounded(work - s->damping_n_s_per_m * velocity);
+        work = t->contact_n;
+        if (p->work == WORK_TOTAL && t->in_contact) work = work - s->damping_n_s_per_m * velocity;
     }
     double moved;
     if (p->pairing == PAIRING_EXACT || p->pairing == PAIRING_NEW_FORCE) {
-        moved = bounded(t->moved_m);
+        moved = t->moved_m;
     } else {
-        moved = bounded(velocity * t->dt_s);
+        moved = velocity * t->dt_s;
     }
-    s->energy_j = bounded(s->energy_j - work * moved);
+    s->energy_j -= work * moved;
     if (t->in_contact) {
-        if (t->dt_s > 0.0) s->motion_m2_per_s = bounded(s->motion_m2_per_s + velocity * velocity * t->dt_s);
+        s->motion_m2_per_s += velocity * velocity * t->dt_s;
         if (t->x_m < s->lowest_m) s->lowest_m = t->x_m;
         if (t->x_m > s->highest_m) s->highest_m = t->x_m;
     }
@@ -194,16 +194,14 @@ static inline void end_cycle(law_state *s, const law_params *p, const law_tick *
 }
 
 static inline double damping_cap(law_state *s, const law_params *p, const law_tick *t) {
-    if (t->dt_s > 0.0) {
-        if (s->period_s == 0.0) s->period_s = bounded(t->dt_s);
-        s->period_s += 0.01 * (bounded(t->dt_s) - s->period_s);
-    }
+    if (s->period_s == 0.0) s->period_s = t->dt_s;
+    s->period_s += 0.01 * (t->dt_s - s->period_s);
     double cap = p->cap_damping_n_s_per_m;
     if (p->cap == CAP_NONE) {
         cap = LIMIT;
-    } else if (p->cap != CAP_FIXED && s->period_s > 0.0) {
+    } else if (p->cap != CAP_FIXED) {
         double mass = p->cap == CAP_KNOWN_MASS ? p->mass_kg : s->felt_mass_kg;
-        if (mass > 0.0) cap = bounded((s->forces_late ? p->late_cap_share : p->cap_share) * mass / s->period_s);
+        if (mass > 0.0) cap = (s->forces_late ? p->late_cap_share : p->cap_share) * mass / s->period_s;
     }
     return cap;
 }
@@ -225,7 +223,7 @@ static inline double law_step(law_state *s, const law_params *p, const law_tick 
     bool ended = cycle_ended(s, s->energy_j, inside, p->window, future);
     if (s->window_rises == 0 && (!ended || s->window_minimum_j == s->energy_j)) {
         s->candidate_motion_m2_per_s = s->motion_m2_per_s;
-        s->candidate_stored_j = 0.5 * fabs(bounded(t->x_m) * bounded(t->contact_n));
+        s->candidate_stored_j = 0.5 * fabs(t->x_m * t->contact_n);
     }
     if (ended) {
         if (s->count >= FELT_SAMPLES) believe(s, p);
@@ -238,7 +236,7 @@ static inline double law_step(law_state *s, const law_params *p, const law_tick 
         s->damping_n_s_per_m = -cap;
     }
     if (!t->in_contact) return 0.0;
-    double force = t->contact_n - bounded(s->damping_n_s_per_m * bounded(t->velocity_m_per_s));
+    double force = t->contact_n - s->damping_n_s_per_m * t->velocity_m_per_s;
     if (force < 0.0 && !p->wall_may_pull) force = 0.0;
     return force;
 }

@@ -37,6 +37,9 @@ class LawParams(Table):
 class LawTick:
     """What a law sees of one contact at one tick.
 
+    Every number is finite and within bounds that the tick keeps, so that a law need not look: |x| and |moved| below
+    1e8 m, |velocity| below 1e6 m/s, dt from 1e-9 to 1 s, forces below 1e18 N.
+
     Attributes:
         x_m: position relative to the wall [m], < 0 inside.
         moved_m: x(n) - x(n-1) [m].

@@ -201,15 +201,17 @@ class Contact:
         if law.publishes:
             state = law.state
             if law.publishes_damping:
-                self.damping_n_s_per_m = _number(state.damping_n_s_per_m)
+                value = state.damping_n_s_per_m
+                self.damping_n_s_per_m = value if value.__class__ is float and -MOST < value < MOST else _number(value)
             if law.publishes_mass:
-                self.felt_mass_kg = _number(state.felt_mass_kg)
+                value = state.felt_mass_kg
+                self.felt_mass_kg = value if value.__class__ is float and -MOST < value < MOST else _number(value)
         if not self.in_contact:
             # Nothing is sent outside, whatever the law says; it still sees the tick, to know that contact is lost.
             self.blending = False
             self.requested_n = self.force_n = 0.0
             return
-        if force_n.__class__ is not float or not -MOST < force_n < MOST:  # the latter is false for NaN as well
+        if force_n.__class__ is not float or not -MOST < force_n < MOST:  # NaN fails every comparison
             force_n = _number(force_n)
         self.requested_n = force_n
         self.force_n = blended(self, self.x_m, force_n) if self.blending else force_n
@@ -253,7 +255,7 @@ def _number(value: Any) -> float:
         ArithmeticError: NaN, infinite or beyond all bounds.
         TypeError: not a number.
     """
-    if not isinstance(value, int | float):
+    if not isinstance(value, (int, float)):
         raise TypeError(f"{value!r} is not a number")
     number = float(value)
     if not -MOST < number < MOST:

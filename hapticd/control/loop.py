@@ -80,6 +80,7 @@ class ControlLoop:
         self._sleep_until = sleep_until
         self._auto_arm = auto_arm
         self._area = shared.record_area
+        driver.share_metrics(shared.metrics)
         self.letters = Letters(self)
         self.stall_ns = int(safety.supervisor_stall_s * 1e9)
         self._stopping = False
@@ -148,6 +149,7 @@ class ControlLoop:
         monotonic_ns = time.monotonic_ns
         thread_time_ns = time.thread_time_ns
         period_ns = self.loop.period_ns
+        disarmed = Mode.DISARMED
         budget_ns = int(self.loop.law_budget * period_ns)
         all_ticks = (1 << BUDGET_TICKS) - 1
         most_late = max(BURST_TICKS, int(LATE_S * 1e9) // period_ns)
@@ -168,7 +170,7 @@ class ControlLoop:
             try:
                 sample = read()
                 force_n = step(sample, (woke_ns - last_ns) * 1e-9)
-                if guard.mode is not Mode.DISARMED:
+                if guard.mode is not disarmed:
                     write(force_n)
                 last_ns = woke_ns
 
@@ -187,7 +189,7 @@ class ControlLoop:
             if self.stop_requested and not self._stopping:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
-            if guard.mode is Mode.DISARMED:
+            if guard.mode is disarmed:
                 if driver.state is DriverState.ENABLED:
                     driver.disable()
                 if self._stopping:

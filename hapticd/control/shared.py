@@ -1,6 +1,6 @@
 """The memory that the control process and the supervisor share.
 
-    words | verdict | mailbox | events | tick records
+    words | the driver's metrics | verdict | mailbox | events | tick records
 
 One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
 copied a slot: on x86 stores become visible in order, so what was not overwritten meanwhile is whole. Other machines
@@ -20,6 +20,7 @@ import msgpack
 
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import Event
+from hapticd.contracts.metric import MOST_METRICS
 from hapticd.contracts.record import RecordLayout, TickRecord
 
 HISTORY_S = 8.0
@@ -28,6 +29,7 @@ HISTORY_S = 8.0
 RECORDS, CONTROL_BEAT, SUPERVISOR_BEAT, MAIL, MAIL_LENGTH, DONE, EVENTS, SKIPPED = range(8)
 """Words: records written, heartbeats [ns], letters sent, their length, letters answered, events, skipped deadlines."""
 
+_METRICS = 2048
 _VERDICT = 4096
 _MAILBOX = 8192
 _MAILBOX_SIZE = 1 << 18
@@ -48,6 +50,7 @@ class SharedMemory:
     Attributes:
         view: all of it.
         words: the 64-bit words at the start.
+        metrics: the driver's metrics; it writes each of them as a whole.
         record_area: where the records lie.
         descriptor: file descriptor to hand to the other process.
 
@@ -67,12 +70,14 @@ class SharedMemory:
         self.descriptor = descriptor
         self._map = mmap.mmap(descriptor, size)
         self.view = memoryview(self._map)
-        self.words = self.view[:_VERDICT].cast("q")
+        self.words = self.view[:_METRICS].cast("q")
+        self.metrics = self.view[_METRICS : _METRICS + 8 * MOST_METRICS].cast("d")
         self.record_area = self.view[_RECORDS:]
 
     def close(self) -> None:
         """Unmap the memory."""
         self.words.release()
+        self.metrics.release()
         self.record_area.release()
         self.view.release()
         self._map.close()

@@ -135,6 +135,8 @@ class ControlTick:
             for low, high in info.workspace_m
         ]
         self._active = self.contacts  # and those that leave
+        self._has_clock = info.has_clock
+        self._has_sequence = info.has_sequence
         self._time_ns = -1
         self._sequence = -1
         self._frozen = 0
@@ -327,13 +329,13 @@ class ControlTick:
 
     def _see(self, sample: Sample, clock_dt_s: float) -> bool:
         """Take a sample in; False when it makes no sense."""
-        if self.info.has_clock:
+        if self._has_clock:
             dt_s = (sample.time_ns - self._time_ns) * 1e-9
             frozen = dt_s <= 0.0
             self._time_ns = sample.time_ns
         else:
             dt_s = clock_dt_s
-            frozen = self.info.has_sequence and sample.sequence == self._sequence
+            frozen = self._has_sequence and sample.sequence == self._sequence
             self._sequence = sample.sequence
         if frozen:
             self._frozen += 1

@@ -34,6 +34,9 @@ from .plant import Device, Rig
 LAWS = (none, energy_cycle, tdpa)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 NUMBER = st.one_of(st.floats(-20.0, 20.0), st.floats(-1e-3, 1e-3), st.sampled_from([0.0, 1e-3, 5e-324, -1e308]), FINITE)
+LONGEST = {"x_m": 1e8, "moved_m": 1e8, "velocity_m_per_s": 1e6, "contact_n": 1e18, "applied_n": 1e18}
+LONGEST["applied_contact_n"] = LONGEST["contact_n"]
+"""What `LawTick` promises of its numbers."""
 each_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__.rpartition(".")[2])
 
 
@@ -116,9 +119,9 @@ def hostile_ticks(draw: st.DrawFn) -> list[LawTick]:
     ticks = []
     for _ in range(draw(st.integers(1, 40))):
         tick = LawTick(abs(draw(NUMBER)))
-        for name in LawTick.__slots__:
-            if name not in ("in_contact", "resolution_m"):
-                setattr(tick, name, draw(NUMBER))
+        for name, most in LONGEST.items():
+            setattr(tick, name, max(-most, min(draw(NUMBER), most)))
+        tick.dt_s = draw(st.one_of(st.just(1e-3), st.floats(1e-9, 1.0)))
         tick.in_contact = tick.x_m < 0.0
         ticks.append(tick)
     return ticks
