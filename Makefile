@@ -6,7 +6,8 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 # What tests and examples use besides Python; one list for this file, CI and the README.
-PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd-container debootstrap
+PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd-container debootstrap \
+    umockdev libumockdev-dev valgrind iproute2 gcc-avr avr-libc libsimavr-dev clang libclang-rt-dev
 
 # Where `make install` puts the program: a directory of its own, which `make uninstall` removes.
 PREFIX ?= /opt/hapticd

@@ -1,0 +1,133 @@
+/* One-axis rig on an ATmega328P: the protocol core, and this board behind it. */
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/wdt.h>
+
+#include "board.h"
+#include "clock.h"
+#include "encoder.h"
+#include "frame.h"
+#include "motor.h"
+#include "rig.h"
+#include "uart.h"
+
+static const struct rig_description DESCRIPTION = {
+    .axes = 1,
+    .capabilities = RIG_HAS_HOME_SWITCH,
+    .buttons = 1,
+    .host_silence_ms = HOST_SILENCE_MS,
+    .nominal_rate_hz = NOMINAL_RATE_HZ,
+    .firmware = {1, 0, 0},
+    .model = MODEL,
+    .serial = SERIAL,
+    .axis = {{COUNT_PM, MAX_FORCE_UN, LOWEST_COUNTS, HIGHEST_COUNTS}},
+};
+
+/* Why the processor started; 0 once that has been dealt with. */
+static uint8_t reset_cause __attribute__((section(".noinit")));
+
+/* Before main(): after a reset by the watchdog it is still running, with its shortest time. */
+void save_reset_cause(void) __attribute__((naked, used, section(".init3")));
+void save_reset_cause(void)
+{
+    reset_cause = MCUSR;
+    MCUSR = 0;
+    wdt_disable();
+}
+
+static uint32_t micros(void *board)
+{
+    (void)board;
+    return clock_us();
+}
+
+static int32_t position(void *board, uint8_t axis)
+{
+    (void)board;
+    (void)axis;
+    return encoder_counts();
+}
+
+static uint16_t buttons(void *board)
+{
+    (void)board;
+    return !(PIND & 1 << BUTTON);
+}
+
+static bool home_switch(void *board)
+{
+    (void)board;
+    return !(PIND & 1 << HOME_SWITCH);
+}
+
+static void drive(void *board, uint8_t axis, int32_t force_un)
+{
+    (void)board;
+    (void)axis;
+    motor_drive(force_un);
+}
+
+static bool problem(void *board, struct rig_problem *problem)
+{
+    (void)board;
+    problem->axis = 0;
+    if (encoder_slipped()) {
+        problem->fault = RIG_SENSOR_FAULT;
+        problem->detail = encoder_counts();
+        return true;
+    }
+    bool switched_on = reset_cause & 1 << PORF; /* brown-out may be set as well while the supply rises */
+    if (!switched_on && (reset_cause & (1 << WDRF | 1 << BORF))) {
+        problem->fault = RIG_RESTART_FAULT;
+        problem->axis = RIG_NO_AXIS;
+        problem->detail = reset_cause;
+        return true;
+    }
+    return false;
+}
+
+static void forget_problem(void *board)
+{
+    (void)board;
+    encoder_forget();
+    reset_cause = 0;
+}
+
+static void send(void *board, const uint8_t *message, uint8_t length)
+{
+    uint8_t frame[FRAME_MAX];
+    (void)board;
+    uart_write(frame, frame_make(message, length, frame));
+}
+
+static const struct rig_hal HAL = {micros, position, buttons, home_switch, drive, problem, forget_problem, send};
+
+int main(void)
+{
+    static struct rig rig;
+    static struct frame_receiver receiver;
+
+    motor_start(); /* first of all: the pins are driven low */
+    PORTD |= 1 << HOME_SWITCH | 1 << BUTTON;
+    clock_start();
+    encoder_start();
+    uart_start();
+    wdt_enable(WDTO_15MS); /* a program that hangs resets the processor, and reset lets go of the motor */
+    sei();
+    rig_start(&rig, &DESCRIPTION, &HAL, 0);
+
+    for (;;) {
+        int16_t byte = uart_read();
+        wdt_reset();
+        if (byte < 0) {
+            rig_work(&rig);
+            continue;
+        }
+        enum frame_event event = frame_receive(&receiver, (uint8_t)byte);
+        if (event == FRAME_MESSAGE) {
+            rig_receive(&rig, receiver.bytes, receiver.length);
+        } else if (event == FRAME_DAMAGED) {
+            rig_receive_damaged(&rig);
+        }
+    }
+}

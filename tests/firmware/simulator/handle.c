@@ -1,0 +1,46 @@
+#include "handle.h"
+
+#include <math.h>
+
+/* 4096 counts a turn of a drum of 10 mm, as drivers/firmware/serial-rig/board.h has it. */
+static const double COUNTS_PER_M = 4096 / (3.14159265358979323846 * 0.010);
+
+const struct handle HANDLE = {.mass_kg = 0.1, .damping_n_s_per_m = 1.0};
+
+void handle_move(struct handle *handle, double dt_s)
+{
+    const double stop_m = STOP_COUNTS / COUNTS_PER_M;
+    double grip_n = -handle->grip_stiffness_n_per_m * (handle->position_m - handle->grip_rest_m) -
+                    handle->grip_damping_n_s_per_m * handle->velocity_m_per_s;
+    double force_n = handle->motor_n + handle->hand_n + grip_n - handle->damping_n_s_per_m * handle->velocity_m_per_s;
+    /* Semi-implicit Euler: a microsecond a step is short against everything that is here. */
+    handle->velocity_m_per_s += force_n / handle->mass_kg * dt_s;
+    handle->position_m += handle->velocity_m_per_s * dt_s;
+    if (fabs(handle->position_m) > stop_m) { /* no bounce */
+        handle->position_m = copysign(stop_m, handle->position_m);
+        handle->velocity_m_per_s = 0.0;
+    }
+}
+
+long handle_counts(const struct handle *handle)
+{
+    return lrint(handle->position_m * COUNTS_PER_M);
+}
+
+unsigned handle_channels(struct handle *handle)
+{
+    static const unsigned GRAY[4] = {0, 1, 3, 2};
+    long counts = handle_counts(handle) - handle->offset;
+    if (counts != handle->shown) {
+        handle->shown += counts > handle->shown ? 1 : -1;
+    }
+    unsigned channels = GRAY[handle->shown & 3];
+    return handle->broken_wire ? channels & 1 : channels;
+}
+
+void handle_place(struct handle *handle, double position_m)
+{
+    handle->position_m = position_m;
+    handle->velocity_m_per_s = 0.0;
+    handle->offset = handle_counts(handle) - handle->shown;
+}

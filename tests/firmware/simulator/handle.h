@@ -1,0 +1,38 @@
+/* The mechanics: one mass on a rail between two end stops, a motor and a hand that push it, an encoder. */
+#ifndef HANDLE_H
+#define HANDLE_H
+
+#include <stdbool.h>
+
+enum { STOP_COUNTS = 6500 }; /* either way, as drivers/firmware/serial-rig/board.h has it */
+
+struct handle {
+    double position_m, velocity_m_per_s;
+    double motor_n; /* what the motor exerts */
+    double mass_kg, damping_n_s_per_m;
+
+    double hand_n;
+    double grip_stiffness_n_per_m, grip_damping_n_s_per_m, grip_rest_m;
+
+    bool reversed;    /* the motor's wires are exchanged */
+    bool broken_wire; /* channel B of the encoder is dead */
+    bool button;
+    long shown;  /* counts that the encoder's channels have shown */
+    long offset; /* of the encoder's disc against the handle [counts] */
+};
+
+extern const struct handle HANDLE; /* at rest in the middle */
+
+/* Let time pass with the motor's force as it is. */
+void handle_move(struct handle *handle, double dt_s);
+
+/* Where it is [counts]. */
+long handle_counts(const struct handle *handle);
+
+/* The encoder's channels now, A in bit 0 and B in bit 1, one edge nearer to where the handle is than last time. */
+unsigned handle_channels(struct handle *handle);
+
+/* Put it somewhere without the encoder's disc turning. */
+void handle_place(struct handle *handle, double position_m);
+
+#endif
