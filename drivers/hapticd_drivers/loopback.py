@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 
-from hapticd.contracts.driver import DeviceInfo, Driver, Sample
+from hapticd.contracts.driver import DeviceInfo, Driver, FoundDevice, Sample
 from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
@@ -38,6 +38,11 @@ class Loopback(Driver[SimulationOptions]):
         self._force_n = 0.0
         self._first = True
         self._started_ns = 0
+
+    @classmethod
+    def find(cls, options: SimulationOptions | None = None) -> list[FoundDevice]:
+        """The model, which is always there."""
+        return [FoundDevice(f"{(options or cls.Options()).model} model, simulated", "")]
 
     def place(self, wall_m: float, outward: int) -> None:
         """Start relative to this wall."""

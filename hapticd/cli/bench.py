@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
-from hapticd import bench
+from hapticd.cli.output import make_console, measuring, print_bars, print_verdicts, quantile_cells, show, titled_table
+from hapticd.cli.rig import rig
+from hapticd.cli.soak import soak
 from hapticd.contracts.errors import HapticdError
 from hapticd.telemetry.status import LATE_EDGES_US
 
@@ -25,9 +24,9 @@ app = typer.Typer(
 )
 
 _JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-_COLOURS = {"PASS": "green", "FAIL": "red", "INCONCLUSIVE": "yellow"}
-_MOST_RIVALS = 3  # named in a report
-_WIDTH = 130  # of tables that go into a file
+
+app.command()(rig)
+app.command()(soak)
 
 
 @app.callback(invoke_without_command=True)
@@ -65,15 +64,15 @@ def tick(
     rates_hz = tuple(rate or (1000.0, 4000.0, 8000.0))
     if quick:
         ticks, rounds, duration = 100, 1, 0.0
-    with _progress(measured.duration_s(ticks, len(rates_hz), duration)) as progress:
+    with measuring(measured.duration_s(ticks, len(rates_hz), duration)) as progress:
         report = measured.measure(ticks, rounds, rates_hz, duration, progress)
     if as_json:
         typer.echo(json.dumps(asdict(report), indent=2))
         return
-    console = _console()
+    console = make_console()
     for warning in report.warnings:
         console.print(f"[yellow]{escape(warning)}[/]")
-    table = _table(
+    table = titled_table(
         console,
         "Body of a tick at 1 kHz [us]; ratios to the arithmetic in the same run",
         *(
@@ -97,28 +96,28 @@ def tick(
             continue
         table.add_row(
             name,
-            *_quantiles(body.paced_us),
+            *quantile_cells(body.paced_us),
             f"{body.of_period:.2%}",
             *(f"{value:.2f}" for value in (body.p50_ratio, body.p99_ratio)),
             *(f"{value:.1f}" for value in (body.hot_us.p50, body.hot_us.p99)),
             f"{body.hot_ratio:.2f}",
         )
-    _show(console, table)
-    table = _table(
+    show(console, table)
+    table = titled_table(
         console,
         "Pieces of it, energy-cycle on one wall, each with the cost of timing it [us]",
         *("piece", "p50", "p99", "p99.9", "max", "p50 without timing", "ratio"),
     )
     for piece in report.pieces:
-        table.add_row(piece.name, *_quantiles(piece.us), f"{piece.p50_net_us:.1f}", f"{piece.p50_ratio:.2f}")
-    _show(console, table)
+        table.add_row(piece.name, *quantile_cells(piece.us), f"{piece.p50_net_us:.1f}", f"{piece.p50_ratio:.2f}")
+    show(console, table)
     if report.rates:
         _rates(console, report.rates)
     for ran in report.rates:
         if ran.fault:
             console.print(f"[red]{ran.rate_hz:g} Hz: the loop stopped: {escape(ran.fault)}[/]")
         console.print(f"{ran.rate_hz:g} Hz, ticks by lateness: {_histogram(ran.late_histogram)}")
-    _verdicts(console, report.bars, report.conditions)
+    print_verdicts(console, report.bars, report.conditions)
 
 
 @app.command()
@@ -145,13 +144,13 @@ def lateness(
 
     if quick:
         blocks, block = 1, 2.0
-    with _progress(len(measured.plan(blocks, control)) * block) as progress:
+    with measuring(len(measured.plan(blocks, control)) * block) as progress:
         report = measured.measure(blocks, block, control, cpu, seed, progress)
     if as_json:
         typer.echo(json.dumps(asdict(report), indent=2))
         return
-    console = _console()
-    table = _table(
+    console = make_console()
+    table = titled_table(
         console,
         f"Excess over the witness at 1 kHz [us], processor {report.cpu}, {report.blocks} x {report.block_s:g} s a cell",
         *("loop", "load", "joined", "skipped", "p50", "p99", "p99.9", "max", "> 200 us"),
@@ -162,15 +161,15 @@ def lateness(
             cell.loop,
             cell.load,
             *(str(cell.joined), str(cell.loop_skipped)),
-            *_quantiles(cell.excess_us),
+            *quantile_cells(cell.excess_us),
             f"{cell.excess_late:.2%}",
             f"{cell.witness_us.p999:.1f}",
             f"{cell.witness_late:.2%}",
             str(cell.witness_skipped),
             f"{cell.others:.2f}",
         )
-    _show(console, table)
-    table = _table(
+    show(console, table)
+    table = titled_table(
         console,
         "Lateness itself, and bodies of the loop's ticks [us]",
         *("loop", "load", "p50", "p99", "p99.9", "max", "> 1 ms", "body p50", "body p99", "body p99.9"),
@@ -179,16 +178,16 @@ def lateness(
         body = [f"{value:.1f}" for value in (cell.busy_us.p50, cell.busy_us.p99, cell.busy_us.p999)]
         table.add_row(
             *(cell.loop, cell.load),
-            *_quantiles(cell.late_us),
+            *quantile_cells(cell.late_us),
             str(cell.loop_over_1ms),
             *(body if cell.busy_us.count else ()),
         )
-    _show(console, table)
+    show(console, table)
     if report.thread_bars:
         console.print("The thread layout, which has to miss some of these:")
-        _bars(console, report.thread_bars)
+        print_bars(console, report.thread_bars)
         console.print()
-    _verdicts(console, report.bars, report.conditions)
+    print_verdicts(console, report.bars, report.conditions)
 
 
 @app.command()
@@ -205,15 +204,15 @@ def telemetry(
 
     costs = []
     seconds = 0.25 if quick else seconds
-    with _progress(3 * seconds) as progress:
+    with measuring(3 * seconds) as progress:
         for subscribers in (0, 1, 16):
             costs.append(measure(subscribers, seconds))
             progress(seconds)
     if as_json:
         typer.echo(json.dumps([{**asdict(cost), "ratio": cost.ratio} for cost in costs], indent=2))
         return
-    console = _console()
-    table = _table(
+    console = make_console()
+    table = titled_table(
         console,
         f"Publishing at 1 kHz; the reference, msgpack packing 16 floats, takes {costs[0].reference_us:.2f} us",
         *("subscribers", "call us/tick", "worst call us", "cpu us/tick", "x reference", "bytes/tick", "missing"),
@@ -224,7 +223,7 @@ def telemetry(
             *(f"{value:.1f}" for value in (cost.call_us, cost.worst_call_us, cost.cpu_us, cost.ratio)),
             *(f"{cost.bytes_per_tick:.0f}", str(cost.missing)),
         )
-    _show(console, table)
+    show(console, table)
 
 
 @app.command()
@@ -248,8 +247,8 @@ def batch(
     if as_json:
         typer.echo(json.dumps(asdict(figures), indent=2))
     else:
-        console = _console()
-        table = _table(
+        console = make_console()
+        table = titled_table(
             console,
             f"{points} loops of {seconds:g} s, load {figures.load:.1f}",
             *("engine", "Mtick/s", "of C on one core"),
@@ -261,45 +260,14 @@ def batch(
             ("interpreted Python", figures.interpreted, figures.interpreted_ratio),
         ):
             table.add_row(name, f"{rate:.2f}", f"{ratio:.3f}")
-        _show(console, table)
+        show(console, table)
         console.print(f"same results to the last bit: {'yes' if figures.equal else 'NO'}")
     if not figures.equal:
         raise typer.Exit(1)
 
 
-@contextmanager
-def _progress(total_s: float) -> Iterator[bench.Progress]:
-    columns = (TextColumn("measuring"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task("", total=total_s)
-        yield lambda seconds: shown.advance(task, seconds)
-
-
-def _console() -> Console:
-    console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=_WIDTH)
-
-
-def _table(console: Console, title: str, *columns: str) -> Table:
-    """Print the title and begin the table that goes under it."""
-    console.print(f"[bold]{escape(title)}[/]", soft_wrap=True)
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
-    return table
-
-
-def _show(console: Console, table: Table) -> None:
-    console.print(table)
-    console.print()
-
-
-def _quantiles(values: bench.Quantiles) -> list[str]:
-    return [f"{value:.1f}" for value in (values.p50, values.p99, values.p999, values.max)]
-
-
 def _rates(console: Console, rates: Sequence[Any]) -> None:
-    table = _table(
+    table = titled_table(
         console,
         "Real daemons: lateness and bodies of their ticks [us]",
         *("rate", "sustained", "ticks", "skipped", "not fetched", "late p50", "p99", "p99.9", "max", "body p50", "p99"),
@@ -309,35 +277,12 @@ def _rates(console: Console, rates: Sequence[Any]) -> None:
             f"{ran.rate_hz:g} Hz",
             f"{ran.sustained_hz:.1f} Hz",
             *(str(count) for count in (ran.ticks, ran.skipped, ran.dropped)),
-            *_quantiles(ran.late_us),
+            *quantile_cells(ran.late_us),
             *(f"{value:.1f}" for value in (ran.busy_us.p50, ran.busy_us.p99)),
         )
-    _show(console, table)
+    show(console, table)
 
 
 def _histogram(counts: Sequence[int]) -> str:
     edges = [f"< {edge}" for edge in LATE_EDGES_US] + [f">= {LATE_EDGES_US[-1]}"]
     return ", ".join(f"{edge} us: {count}" for edge, count in zip(edges, counts, strict=True) if count)
-
-
-def _verdicts(console: Console, bars: Sequence[bench.Bar], conditions: bench.Conditions) -> None:
-    _bars(console, bars)
-    for rival in conditions.rivals[:_MOST_RIVALS]:
-        console.print(f"[red]another real-time program was running: {escape(rival)}[/]", soft_wrap=True)
-    if len(conditions.rivals) > _MOST_RIVALS:
-        console.print(f"[red]and {len(conditions.rivals) - _MOST_RIVALS} more[/]")
-    console.print(
-        f"\n{escape(conditions.machine)}, Linux {escape(conditions.kernel)}, Python {conditions.python}; "
-        f"{conditions.seconds:.0f} s, load {conditions.load_before:.2f} to {conditions.load_after:.2f}, other programs "
-        f"kept {conditions.others:.2f} processors busy, {conditions.stolen:.3f} stolen by the host",
-        soft_wrap=True,
-    )
-
-
-def _bars(console: Console, bars: Sequence[bench.Bar]) -> None:
-    for bar in bars:
-        note = f"  ({escape(bar.note)})" if bar.note else ""
-        verdict = f"[{_COLOURS[bar.verdict]}]{bar.verdict:12}[/]"
-        console.print(
-            f"{verdict} {escape(bar.name)}: {bar.measured:.4g}, at most {bar.limit:.4g}{note}", soft_wrap=True
-        )

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hapticd.cli.destination import Connect, Instance, Keys
 from hapticd.commander import command
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 
@@ -15,8 +16,10 @@ TIMEOUT_S = 120.0
 
 
 def calibrate(
-    instance: Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.")] = DEFAULT_INSTANCE,
+    instance: Instance = DEFAULT_INSTANCE,
     countdown_s: Annotated[int, typer.Option("--countdown", min=0, max=60, help="Seconds to clear the workspace.")] = 5,
+    connect: Connect = None,
+    keys: Keys = None,
 ) -> None:
     """Calibrate a running daemon's device, which moves its arm.
 
@@ -29,4 +32,4 @@ def calibrate(
         typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
         time.sleep(1.0)
     typer.echo("calibrating", err=True)
-    command("calibrate", instance, TIMEOUT_S)
+    command("calibrate", instance, TIMEOUT_S, connect, keys)

@@ -10,6 +10,8 @@ import typer
 
 from hapticd.config.loading import load
 from hapticd.contracts.errors import ConfigError
+from hapticd.control.fitting import fit
+from hapticd.keys.access import key_ring
 
 
 def check(
@@ -29,14 +31,20 @@ def check(
         verdict: dict[str, object] = {"file": str(file), "ok": True, "problems": []}
         try:
             loaded = load(file)
+            key_ring(loaded)
+            found = fit(loaded)
         except ConfigError as error:
             verdict |= {"ok": False, "problems": error.problems}
             problems += error.problems
         else:
             device, law, rate_hz = loaded.config.device.driver, loaded.config.controller.law, loaded.config.loop.rate_hz
             verdict |= {"hash": loaded.hash, "sha256": loaded.sha256, "driver": device, "law": law, "rate_hz": rate_hz}
+            if found is not None:
+                verdict["accuracy"] = found.reason
             if not as_json:
                 typer.echo(f"{file}: ok, {loaded.hash}, {device} with {law} at {rate_hz:g} Hz")
+            if found is not None and not as_json:
+                typer.echo(f"{file}: device.options.accuracy: {found.reason}")
         verdicts.append(verdict)
     if as_json:
         typer.echo(json.dumps(verdicts, indent=2))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import typer
-
+from hapticd.cli.destination import Connect, Instance, Keys
 from hapticd.commander import command
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 
 
 def clear(
-    instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of the daemon."),
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
 ) -> None:
     """Clear the fault that stopped a running daemon.
 
@@ -17,4 +18,4 @@ def clear(
 
     Example: hapticd clear --instance left
     """
-    command("clear", instance)
+    command("clear", instance, connect=connect, keys=keys)

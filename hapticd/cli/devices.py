@@ -1,24 +1,129 @@
-"""`hapticd devices`: the installed drivers and the options of each."""
+"""`hapticd devices`: which devices the installed drivers find, and the options of a driver."""
 
 from __future__ import annotations
 
+import json
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from itertools import chain
+from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.text import Text
 
-from hapticd import registry
+from hapticd import lookup, registry
 from hapticd.cli import catalogue
+from hapticd.cli.doctor import folded
+from hapticd.config.loading import load
+from hapticd.contracts.driver import DriverOptions
+from hapticd.contracts.errors import ConfigError
+from hapticd.doctor.finding import for_this_user
+from hapticd.lookup import Lookup
+from hapticd.share import default_config
+
+_HEAD = ("driver", "device", "serial", "where", "state")
+_STYLES = {"ready": "green", "usable": "yellow", "cannot be used": "bold red"}
+_INDENT = 4
+
+Row = tuple[str, ...]
+Details = tuple[str, Sequence[str]]
 
 
 def devices(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Only this driver.")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Only this driver, with its options.")] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            "--config",
+            "-c",
+            help="Configuration file, whose [device.options] tell its driver where to look; "
+            "/etc/hapticd/hapticd.toml or the shipped one when not given.",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array, an object a driver.")] = False,
 ) -> None:
-    """List the installed device drivers and their options.
+    """List the devices that the installed drivers find.
 
-    A driver that cannot be imported is listed with the reason.
+    One that cannot be used is listed with the reason and with what mends it. No device is moved; some have to be
+    opened for a moment, so one that the daemon has shows as held. With NAME, the options of that driver follow.
 
-    Example: hapticd devices loopback
+    Example: hapticd devices omega7
     """
     plugins = catalogue.installed(registry.DRIVERS, name, registry.driver, lambda driver: driver.Options)
-    catalogue.show(plugins, "device.options", as_json)
+    configured, options = _configured(config)
+    wanted = {plugin.name: options if plugin.name == configured else None for plugin in plugins if not plugin.problem}
+    looked = {one.driver: one for one in lookup.look(wanted)}
+    if as_json:
+        found = [looked.get(plugin.name, Lookup(plugin.name, problem=plugin.problem)) for plugin in plugins]
+        rows = [
+            {
+                **asdict(plugin),
+                "problem": one.problem,
+                "devices": [asdict(device) for device in one.devices],
+                "diagnoses": [asdict(diagnosis) for diagnosis in one.diagnoses],
+            }
+            for plugin, one in zip(plugins, found, strict=True)
+        ]
+        typer.echo(json.dumps(rows, indent=2, default=str))
+        return
+    console = Console(highlight=False)
+    _show(
+        console,
+        [
+            looked.get(plugin.name, Lookup(plugin.name, problem=f"cannot be used: {plugin.problem}"))
+            for plugin in plugins
+        ],
+    )
+    console.print()
+    if name is None:
+        console.print("hapticd devices NAME lists the options of a driver.", style="dim")
+    else:
+        catalogue.show(plugins, "device.options", False)
+
+
+def _configured(config: Path | None) -> tuple[str, DriverOptions | None]:
+    """The configured driver and its options; a file that nobody asked for may be unusable."""
+    try:
+        loaded = load(config or default_config())
+    except ConfigError:
+        if config is not None:
+            raise
+        return "", None
+    return loaded.config.device.driver, loaded.options
+
+
+def _show(console: Console, looked: Sequence[Lookup]) -> None:
+    """A line a device, what is to be known of it below, and a line for a driver that found none."""
+    lines = list(chain.from_iterable(map(_lines, looked)))
+    rows = [_HEAD, *(row for row, _ in lines)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD) - 1)]
+    for row, details in [(_HEAD, ()), *lines]:
+        text = Text("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)) + "  ")
+        text.append(row[-1], "" if row is _HEAD else _STYLES.get(row[-1], "dim"))
+        if row is _HEAD:
+            text.stylize("bold")
+        console.print(text, soft_wrap=True)
+        for said, mend in details:
+            for line in textwrap.wrap(said, max(40, console.width - _INDENT), break_long_words=False):
+                console.print(Text(" " * _INDENT + line), soft_wrap=True)
+            for command in map(for_this_user, mend):
+                for line in folded(command, max(40, console.width - _INDENT)):
+                    style = "dim" if line.startswith("#") else "bold"
+                    console.print(Text(" " * _INDENT + line, style), soft_wrap=True)
+
+
+def _lines(looked: Lookup) -> Iterator[tuple[Row, tuple[Details, ...]]]:
+    for device in looked.devices:
+        state = "cannot be used" if device.problem else "usable" if device.note else "ready"
+        told: list[Details] = [(device.problem, device.mend), (device.note, ())]
+        said = tuple(details for details in told if details[0])
+        yield (looked.driver, device.model, device.serial or "-", device.where or "-", state), said
+    # What keeps a driver from every device was already said of each that was found.
+    lacks = [(one.text, one.mend) for one in looked.diagnoses if one.mark == "problem" and not looked.devices]
+    if looked.problem:
+        yield (looked.driver, "-", "-", "-", "could not look"), ((looked.problem, ()), *lacks)
+    elif not looked.devices:
+        yield (looked.driver, "-", "-", "-", f"none found: {looked.absent}"), tuple(lacks)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import typer
-
+from hapticd.cli.destination import Connect, Instance, Keys
 from hapticd.commander import command
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 
 
 def disarm(
-    instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of the daemon."),
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
 ) -> None:
     """Ramp the force of a running daemon to zero.
 
@@ -17,4 +18,4 @@ def disarm(
 
     Example: hapticd disarm --instance left
     """
-    command("disarm", instance)
+    command("disarm", instance, connect=connect, keys=keys)

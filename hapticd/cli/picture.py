@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -177,7 +178,8 @@ def si(value: float, unit: str) -> str:
 
 
 def _running(known: Known, status: Status, endpoint: str, width: int, height: int, now_s: float) -> list[Text]:
-    above = [_header(status, known, width, now_s), *_warnings(status), _loop(known, status, width)]
+    above = [_header(status, known, width, now_s), *_warnings(status), _loop(known, status, width), *_device(status)]
+    above += _model(status, width)
     middle = [*_walls(known, status, width), _energy(known, width)]
     footer = _footer(status, endpoint, width)
     room = height - len(above) - len(middle) - 1
@@ -216,6 +218,8 @@ def _state(status: Status) -> tuple[str, str]:
 def _warnings(status: Status) -> list[Text]:
     """Standing warnings, at most two lines, and what a latched fault asks for."""
     lines = list(status.warnings)
+    if not status.calibrated:
+        lines.insert(0, "not calibrated, so without force: clear its workspace, then  hapticd calibrate")
     if status.latched:
         lines.insert(0, "stopped by a fault: see events below, then  hapticd clear")
     if len(lines) > 2:
@@ -238,6 +242,21 @@ def _loop(known: Known, status: Status, width: int) -> Text:
         line.append("  lost ", _QUIET).append_text(_count(lost, "red"))
     extra = _quiet("  busy max ").append(si(status.busy_max_us * 1e-6, "s"), "default")
     return line.append_text(extra) if line.cell_len + extra.cell_len <= width else line
+
+
+def _device(status: Status) -> list[Text]:
+    """What the driver counts, where it counts anything."""
+    if not status.device_metrics:
+        return []
+    line = _quiet(" device")
+    for name, value in status.device_metrics.items():
+        line.append(f"  {name} ", _QUIET).append(f"{value:.10g}")
+    return [line]
+
+
+def _model(status: Status, width: int) -> list[Text]:
+    """The device model, where an accuracy was asked for."""
+    return [_quiet(f" {line}") for line in textwrap.wrap(status.accuracy, max(20, width - 2))]
 
 
 def _late_bars(status: Status) -> Text:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import typer
 
+from hapticd.cli.destination import Connect, Instance, Keys
 from hapticd.commander import command
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
 
 
 def reload(
-    instance: str = typer.Option(DEFAULT_INSTANCE, "--instance", "-i", help="Name of the daemon."),
+    instance: Instance = DEFAULT_INSTANCE,
     wait: bool = typer.Option(
         False, "--wait", help="Wait for the verdict; a refused file is printed and exits with 2."
     ),
+    connect: Connect = None,
+    keys: Keys = None,
 ) -> None:
     """Let a running daemon take its edited file over.
 
@@ -21,4 +24,4 @@ def reload(
 
     Example: hapticd reload --wait
     """
-    command("reload", instance, wait=wait)
+    command("reload", instance, connect=connect, keys=keys, wait=wait)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -34,7 +33,8 @@ def run(
         from hapticd.cli.watched import run_watched
 
         raise typer.Exit(run_watched(path, instance))
+    from hapticd.supervisor.journal import log_handler
     from hapticd.supervisor.service import Service
 
-    logging.basicConfig(level=logging.INFO, format="%(levelname)-7s %(message)s", stream=sys.stderr)
+    logging.basicConfig(level=logging.INFO, handlers=[log_handler()])
     raise typer.Exit(Service(loaded, instance).run())

@@ -13,6 +13,9 @@ STUDIES: Final = {
     "paper": "Run every simulation and experiment of the paper, and say what reproduces.",
     "zwidth": "Map where laws keep a pressed wall stable, over any two parameters.",
     "robustness": "Try laws and readings on random devices.",
+    "accuracy": "Measure what every shortcut costs in accuracy, and all accuracy in time.",
+    "scene": "Find the smallest model that keeps every answer of a scene.",
+    "extremes": "Hold the model's arithmetic against exact answers, over many decades.",
 }
 """Every study with its line in the overview. `hapticd.study.NAME.command` has a function `command`."""
 

@@ -23,6 +23,7 @@ import typer
 from rich.console import Console, Group
 from rich.live import Live
 
+from hapticd.cli.destination import Instance, Keys
 from hapticd.cli.picture import SILENT_S, Known, frame, one_line
 from hapticd.client import Client, Event, Record, SilenceError, Status, connect
 from hapticd.contracts.errors import HapticdError
@@ -39,15 +40,16 @@ _SHOWN = ("position", "energy", "damping", "cycle", "event", "status")
 
 
 def watch(
-    instance: Annotated[
-        str, typer.Option("--instance", "-i", help="Name of the daemon's instance.")
-    ] = DEFAULT_INSTANCE,
-    endpoint: Annotated[
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Annotated[
         str | None,
         typer.Option(
-            "--endpoint", help="Where it publishes, ipc://PATH or tcp://HOST:PORT; the instance's own when not given."
+            "--connect",
+            metavar="ENDPOINT",
+            help="Where it publishes, ipc://PATH or tcp://HOST:PORT; the instance's own when not given.",
         ),
     ] = None,
+    keys: Keys = None,
     once: Annotated[bool, typer.Option("--once", help="Print one picture and exit.")] = False,
     picture: Annotated[
         Path | None, typer.Option("--picture", help="Keep four seconds as an SVG picture of 80x24 characters and exit.")
@@ -62,12 +64,13 @@ def watch(
     Example: hapticd watch --instance default
     """
     with suppress(KeyboardInterrupt):
-        show(endpoint, instance, once=once, picture=picture, as_json=as_json)
+        show(connect, instance, keys, once=once, picture=picture, as_json=as_json)
 
 
 def show(
     endpoint: str | None = None,
     instance: str = DEFAULT_INSTANCE,
+    keys: Path | None = None,
     *,
     once: bool = False,
     picture: Path | None = None,
@@ -79,6 +82,7 @@ def show(
     Args:
         endpoint: where it publishes; None: the instance's own, looked for again while there is no daemon.
         instance: name of the daemon's instance, when no endpoint is given.
+        keys: key file for the endpoint of another computer; None: the one that $HAPTICD_KEYS names, if any.
         once: one picture or one line of JSON, then end.
         picture: where to keep one picture as SVG, then end.
         as_json: statuses as JSON and nothing else.
@@ -87,11 +91,12 @@ def show(
     Raises:
         SilenceError: `once` or `picture`, and no daemon answered.
         UnwritableError: the picture cannot be written.
+        RefusedKeyError: the daemon lets only those in whose keys it lists.
         SchemaError, WireError: what answers speaks otherwise.
         KeyboardInterrupt: Ctrl-C.
     """
     console = Console(highlight=False)
-    with _Feed(endpoint, instance, ("status",) if as_json else _SHOWN) as feed:
+    with _Feed(endpoint, instance, keys, ("status",) if as_json else _SHOWN) as feed:
         if picture is not None:
             _keep(feed, picture)
         elif as_json:
@@ -111,10 +116,11 @@ class UnwritableError(HapticdError):
 class _Feed:
     """What is known of a daemon, and where it comes from."""
 
-    def __init__(self, endpoint: str | None, instance: str, topics: tuple[str, ...]) -> None:
+    def __init__(self, endpoint: str | None, instance: str, keys: Path | None, topics: tuple[str, ...]) -> None:
         self.known = Known()
         self._given = endpoint
         self._instance = instance
+        self._keys = keys
         self._topics = topics
         self._client = self._connect()
         self._look_again_s = time.monotonic() + _LOOK_AGAIN_S
@@ -128,6 +134,10 @@ class _Feed:
     @property
     def endpoint(self) -> str:
         return self._client.endpoint
+
+    @property
+    def doubt(self) -> str:
+        return self._client.doubt
 
     def silent(self) -> bool:
         """Whether there is no daemon, or none any more."""
@@ -158,11 +168,13 @@ class _Feed:
         end_s = time.monotonic() + _PATIENCE_S
         while self.known.status is None:
             if time.monotonic() > end_s:
-                raise SilenceError(f"{self.endpoint}: no daemon answers; start one with `hapticd run`")
+                raise SilenceError(
+                    f"{self.endpoint}: no daemon answers{self.doubt or '; start one with `hapticd run`'}"
+                )
             self.drain(0.1)
 
     def _connect(self) -> Client:
-        return connect(self._given, self._instance, self._topics)
+        return connect(self._given, self._instance, self._topics, keys=self._keys)
 
 
 def _live(feed: _Feed, console: Console, stop: Callable[[], bool]) -> None:
@@ -258,7 +270,7 @@ def _print_lines(feed: _Feed, stop: Callable[[], bool]) -> None:
             _say(one_line(feed.known))
             silent = False
         elif not silent:
-            typer.echo(f"waiting for a daemon on {feed.endpoint}", err=True)
+            typer.echo(f"waiting for a daemon on {feed.endpoint}{feed.doubt}", err=True)
             silent = True
 
 

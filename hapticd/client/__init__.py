@@ -13,6 +13,7 @@ from hapticd.client.connection import Client, connect
 from hapticd.client.decoding import decode
 from hapticd.client.errors import ClientError, SchemaError, SilenceError, WireError
 from hapticd.client.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Timing
+from hapticd.keys.visit import RefusedKeyError
 from hapticd.telemetry.status import Status
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Input",
     "Position",
     "Record",
+    "RefusedKeyError",
     "SchemaError",
     "SilenceError",
     "Status",

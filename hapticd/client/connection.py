@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import zmq
@@ -12,6 +13,8 @@ import zmq
 from hapticd.client.decoding import decode
 from hapticd.client.errors import ClientError, SchemaError, SilenceError, WireError
 from hapticd.client.records import Gap, Record, Sent
+from hapticd.keys.file import Key
+from hapticd.keys.visit import Visit, client_keys
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, telemetry_endpoint
 from hapticd.telemetry.status import Status
 from hapticd.telemetry.wire import SCHEMA, Topic
@@ -26,20 +29,24 @@ def connect(
     topics: Sequence[type[Sent] | Topic | str] = tuple(Topic),
     timeout_s: float | None = None,
     receive_high_water: int = 1000,
+    keys: Path | str | None = None,
 ) -> Client:
     """Subscribe to a daemon. It need not run yet, and may be restarted: ZeroMQ connects again by itself.
 
     Args:
-        endpoint: for example "tcp://127.0.0.1:9872"; None: the instance's own on this computer.
+        endpoint: for example "tcp://lab.example:9872"; None: the instance's own on this computer.
         instance: name of the daemon's instance, when no endpoint is given.
         topics: record classes, or topics by name ("position" or "hapticd/position"); all unless given.
         timeout_s: longest silence while iterating [s]; None: wait for ever.
         receive_high_water: messages kept while the caller is busy; new ones are lost beyond it.
+        keys: key file for a daemon on another computer; None: the one that $HAPTICD_KEYS names, if any.
 
     Raises:
         ClientError: no such topic, or ZeroMQ cannot use the endpoint.
+        ConfigError: the key file cannot be used.
     """
-    return Client(endpoint or telemetry_endpoint(instance), topics, timeout_s, receive_high_water)
+    where = endpoint or telemetry_endpoint(instance)
+    return Client(where, topics, timeout_s, receive_high_water, client_keys(where, keys))
 
 
 class Client:
@@ -60,6 +67,7 @@ class Client:
         topics: Sequence[type[Sent] | Topic | str],
         timeout_s: float | None,
         receive_high_water: int,
+        keys: Key | None = None,
     ) -> None:
         self.endpoint = endpoint
         self.status: Status | None = None
@@ -69,15 +77,14 @@ class Client:
         self._last: dict[Topic, int] = {}
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.SUB)
+        self._visit = Visit(self._socket, endpoint, keys)
         try:
             self._socket.setsockopt(zmq.LINGER, 0)
             self._socket.setsockopt(zmq.RCVHWM, receive_high_water)
             self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_MESSAGE)
-            if "[" in endpoint:
-                self._socket.setsockopt(zmq.IPV6, 1)
             for topic in self._topics | {Topic.STATUS}:
                 self._socket.setsockopt_string(zmq.SUBSCRIBE, topic)
-            self._socket.connect(endpoint)
+            self._visit.connect()
         except zmq.ZMQError as error:
             self.close()
             raise ClientError(f"{endpoint}: {error.strerror}; an endpoint is ipc://PATH or tcp://HOST:PORT") from error
@@ -93,12 +100,13 @@ class Client:
 
         Raises:
             SilenceError: nothing arrived for `timeout_s`.
-            SchemaError, WireError: as `receive`.
+            RefusedKeyError, SchemaError, WireError: as `receive`.
         """
         while True:
             records = self.receive(self._timeout_s)
             if not records:
-                raise SilenceError(f"{self.endpoint}: nothing for {self._timeout_s:g} s; is the daemon running there?")
+                doubt = self.doubt or "; is the daemon running there?"
+                raise SilenceError(f"{self.endpoint}: nothing for {self._timeout_s:g} s{doubt}")
             yield from records
 
     def receive(self, timeout_s: float | None = 0.0) -> list[Record]:
@@ -108,21 +116,27 @@ class Client:
             timeout_s: how long to wait for it [s]; None: for ever.
 
         Raises:
+            RefusedKeyError: the daemon lets only those in whose keys it lists.
             SchemaError: the daemon's schema is not known to this client.
             WireError: somebody sends what the contract does not allow.
         """
         until = math.inf if timeout_s is None else time.monotonic() + timeout_s
         while True:
             left_s = until - time.monotonic()
-            if not self._socket.poll(None if left_s == math.inf else max(0, math.ceil(left_s * 1000))):
+            if not self._visit.wait(None if left_s == math.inf else left_s):
                 return []
             records = self._accept(self._socket.recv_multipart())
             if records:
                 return records
 
+    @property
+    def doubt(self) -> str:
+        """What is wrong with whoever answers at the endpoint, to be put behind a statement; empty when nothing is."""
+        return self._visit.doubt
+
     def close(self) -> None:
         """Disconnect. May be called twice."""
-        self._socket.close(linger=0)
+        self._visit.close()
         self._context.term()
 
     def _accept(self, frames: list[bytes]) -> list[Record]:

@@ -76,6 +76,12 @@ def _array_of(element: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, ...]]
     return convert
 
 
+def _numbers_by_name(value: Any) -> dict[str, float]:
+    if type(value) is not dict:
+        raise _UnfitError("a map")
+    return {_text(name): _number(number) for name, number in value.items()}
+
+
 _CONVERTERS: dict[str, Callable[[Any], Any]] = {
     "float": _number,
     "int": _integer,
@@ -83,6 +89,7 @@ _CONVERTERS: dict[str, Callable[[Any], Any]] = {
     "str": _text,
     "int | None": _integer,
     "float | None": _number,
+    "dict[str, float]": _numbers_by_name,
     "tuple[float, ...]": _array_of(_number),
     "tuple[int, ...]": _array_of(_integer),
     "tuple[bool, ...]": _array_of(_flag),
@@ -98,7 +105,7 @@ class _Reader:
         self.keys = []
         for key in dataclasses.fields(record):
             if key.name != "fields":
-                required = key.default is dataclasses.MISSING
+                required = key.default is key.default_factory is dataclasses.MISSING
                 self.keys.append((key.name, _CONVERTERS[str(key.type)], required))
 
     def read(self, topic: str, fields: Any) -> Any:

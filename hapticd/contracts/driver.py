@@ -16,7 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Generic, TypeVar
 
+from hapticd.contracts.diagnosis import Diagnosis
 from hapticd.contracts.errors import DriverStateError
+from hapticd.contracts.metric import MOST_METRICS, Metric
 from hapticd.contracts.table import Table
 
 
@@ -47,6 +49,7 @@ class DeviceInfo:
         has_gripper, has_orientation, has_velocity: whether samples carry them.
         has_clock: samples carry the device's own time.
         has_sequence: samples carry the device's own count.
+        notes: what the user should know while it is used, a line each, such as what slows it down and how to end that.
     """
 
     model: str
@@ -65,6 +68,7 @@ class DeviceInfo:
     has_velocity: bool = False
     has_clock: bool = False
     has_sequence: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def detects_frozen(self) -> bool:
@@ -82,6 +86,7 @@ class FoundDevice:
         where: where it is plugged in, for people; "" when nobody tells.
         problem: why it cannot be used now; "" when it can.
         note: what is to be known before it is used; "" when there is nothing.
+        mend: lines for a shell that end the problem, as they stand; one that no command can mend is a comment, `# ...`.
     """
 
     model: str
@@ -89,6 +94,7 @@ class FoundDevice:
     where: str = ""
     problem: str = ""
     note: str = ""
+    mend: tuple[str, ...] = ()
 
 
 class Sample:
@@ -102,9 +108,14 @@ class Sample:
         buttons: bit i is button i.
         gripper_m: opening [m]; 0 without one.
         orientation: rotation matrix, row by row (9 elements); identity without a wrist.
+        calibrated: False while the device does not know where it is. Its positions are nothing to rely on then, and a
+            driver refuses to enable it.
     """
 
-    __slots__ = ("buttons", "gripper_m", "orientation", "position_m", "sequence", "time_ns", "velocity_m_per_s")
+    __slots__ = (
+        *("buttons", "calibrated", "gripper_m", "orientation", "position_m", "sequence", "time_ns"),
+        "velocity_m_per_s",
+    )
 
     def __init__(self, axes: int) -> None:
         self.position_m = [0.0] * axes
@@ -114,6 +125,7 @@ class Sample:
         self.buttons = 0
         self.gripper_m = 0.0
         self.orientation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+        self.calibrated = True
 
 
 class DriverState(enum.Enum):
@@ -124,19 +136,32 @@ class DriverState(enum.Enum):
     ENABLED = "enabled"
 
 
+_CLOSED, _ENABLED = DriverState.CLOSED, DriverState.ENABLED  # Python 3.11 takes 0.1 us to look a member up, each time
+
+
 class Driver(ABC, Generic[OptionsT]):
     """A device behind a driver.
 
     Args:
         options: the device's options, an instance of `Options`.
         period_s: time between ticks [s].
+
+    Attributes:
+        Options: the keys of [device.options].
+        METRICS: what it counts and measures.
+        ABSENT: what to do when `find` finds nothing, in a few words.
+        metrics: one number for each of `METRICS`, in their order; a driver writes them whenever it likes, from any of
+            its threads, which costs a tick no more than storing a number.
     """
 
     Options: ClassVar[type[DriverOptions]] = DriverOptions
+    METRICS: ClassVar[tuple[Metric, ...]] = ()
+    ABSENT: ClassVar[str] = "plug it in"
 
     def __init__(self, options: OptionsT, period_s: float) -> None:
         self.options = options
         self.period_s = period_s
+        self.metrics = memoryview(bytearray(8 * MOST_METRICS)).cast("d")
         self.state = DriverState.CLOSED
         self._info: DeviceInfo | None = None
         self._limit_squared = 0.0
@@ -146,8 +171,21 @@ class Driver(ABC, Generic[OptionsT]):
     def find(cls, options: OptionsT | None = None) -> list[FoundDevice]:
         """Every device of this kind that is there, whether it can be used or not; none is moved or kept open.
 
+        `hapticd devices` asks each driver in a process of its own, so that one that fails spoils no other.
+
         Args:
             options: what is needed to look for it; None: the defaults.
+        """
+        return []
+
+    @classmethod
+    def diagnose(cls, options: OptionsT | None = None) -> list[Diagnosis]:
+        """What this computer has and lacks of what the driver needs; opens no device.
+
+        `hapticd doctor` shows it, in a process of its own, and `hapticd devices` its problems where it finds nothing.
+
+        Args:
+            options: those of the configuration; None: the defaults.
         """
         return []
 
@@ -171,6 +209,11 @@ class Driver(ABC, Generic[OptionsT]):
             wall_m: position of the wall's plane [m].
             outward: +1 when the free side is the positive one, -1 otherwise.
         """
+
+    def share_metrics(self, place: memoryview[float]) -> None:
+        """Keep the metrics in this memory from now on, where another process reads them."""
+        place[:] = self.metrics
+        self.metrics = place
 
     def open(self) -> DeviceInfo:
         """Find the device and learn what it is; no force, no motion.
@@ -221,7 +264,7 @@ class Driver(ABC, Generic[OptionsT]):
         Raises:
             DriverError: lost, late, or it makes no sense.
         """
-        if self.state is DriverState.CLOSED:
+        if self.state is _CLOSED:
             raise DriverStateError("read: the device is not open")
         return self._read()
 
@@ -235,7 +278,7 @@ class Driver(ABC, Generic[OptionsT]):
             DriverStateError: not enabled, wrong number of axes, not finite, or beyond the device's limit.
             DriverError: lost or late.
         """
-        if self.state is not DriverState.ENABLED:
+        if self.state is not _ENABLED:
             raise DriverStateError(f"write: the device is {self.state.value}, not enabled")
         squared = 0.0
         for newton in force_n:

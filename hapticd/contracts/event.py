@@ -19,6 +19,7 @@ class EventCode(enum.IntEnum):
     DEVICE_FOUND = 107
     CALIBRATING = 108
     CALIBRATED = 109
+    TARED = 110
 
     LAW_FAILED = 200
     LAW_OVER_BUDGET = 201
@@ -36,6 +37,7 @@ class EventCode(enum.IntEnum):
     NOT_REALTIME = 302
     FAULT_RECORD_FAILED = 303
     SUBSCRIBER_FLOOD = 304
+    DEVICE_WARNING = 305
 
 
 @dataclass(slots=True)

@@ -19,6 +19,7 @@ class Flag(enum.IntFlag):
     RELEASING = 4  # the force is being ramped to zero
     LATCHED = 8  # stopped by a fault until cleared
     LIMITED = 16  # the guard reduced the force in this tick
+    UNCALIBRATED = 32  # the device does not know where it is
 
 
 @dataclass(slots=True)

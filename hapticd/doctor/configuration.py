@@ -10,9 +10,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from hapticd.config.loading import LoadedConfig, load
-from hapticd.config.models import DeviceConfig, LoopConfig, TelemetryConfig
+from hapticd.config.models import Config, DeviceConfig, LoopConfig
 from hapticd.contracts.errors import ConfigError
 from hapticd.doctor.finding import Finding, ok, problem
+from hapticd.keys.access import tcp_endpoints
 from hapticd.share import directory
 
 
@@ -24,7 +25,7 @@ class Wanted:
         path: the file.
         loop: its loop, by default where the file is no help.
         driver: its driver.
-        tcp: its extra endpoint.
+        tcp: its TCP endpoints, by the key that names them.
         loaded: the file, None when it cannot be used.
         problems: why not, a line each.
     """
@@ -32,7 +33,7 @@ class Wanted:
     path: Path
     loop: LoopConfig
     driver: str
-    tcp: str | None
+    tcp: dict[str, str]
     loaded: LoadedConfig | None = None
     problems: tuple[str, ...] = ()
 
@@ -44,7 +45,7 @@ class Wanted:
         except ConfigError as error:
             return cls(path, *_salvaged(path), problems=error.problems)
         config = loaded.config
-        return cls(path, config.loop, config.device.driver, config.telemetry.tcp, loaded)
+        return cls(path, config.loop, config.device.driver, tcp_endpoints(config), loaded)
 
 
 def usable(wanted: Wanted) -> list[Finding]:
@@ -59,9 +60,10 @@ def usable(wanted: Wanted) -> list[Finding]:
     return [ok(f"{wanted.path}: ok, {wanted.loaded.hash}, {wanted.driver} with {law} at {rate_hz:g} Hz")]
 
 
-def _salvaged(path: Path) -> tuple[LoopConfig, str, str | None]:
-    """Loop, driver and endpoint of a file that cannot be used as a whole; defaults where it is no help."""
-    loop, device, telemetry = LoopConfig(), DeviceConfig(), TelemetryConfig()
+def _salvaged(path: Path) -> tuple[LoopConfig, str, dict[str, str]]:
+    """Loop, driver and endpoints of a file that cannot be used as a whole; defaults where it is no help."""
+    loop, device = LoopConfig(), DeviceConfig()
+    remote = Config()
     tables = {}
     with contextlib.suppress(OSError, ValueError):
         tables = {name: table for name, table in tomllib.loads(path.read_text()).items() if isinstance(table, dict)}
@@ -70,5 +72,5 @@ def _salvaged(path: Path) -> tuple[LoopConfig, str, str | None]:
     with contextlib.suppress(ValidationError):
         device = DeviceConfig.model_validate({"driver": tables.get("device", {}).get("driver", device.driver)})
     with contextlib.suppress(ValidationError):
-        telemetry = TelemetryConfig.model_validate(tables.get("telemetry", {}))
-    return loop, device.driver, telemetry.tcp
+        remote = Config.model_validate({name: tables.get(name, {}) for name in ("telemetry", "control")})
+    return loop, device.driver, tcp_endpoints(remote)

@@ -11,8 +11,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from hapticd.doctor.finding import Finding, advice, ok, problem
+from hapticd.contracts.errors import ConfigError
+from hapticd.doctor.finding import Finding, advice, ok, own_command, problem
 from hapticd.doctor.tree import ROOT, read, read_if_there
+from hapticd.keys.access import stays_here, takes_keys
+from hapticd.keys.directory import KeyDirectory
 from hapticd.telemetry.endpoint import CONTROL, TELEMETRY
 
 _LONGEST_SOCKET = 107
@@ -72,25 +75,42 @@ def runtime(directory: Path) -> Finding:
     return ok(str(directory) if place == directory else f"{directory}, made when the daemon starts")
 
 
-def tcp(endpoint: str | None, process: int) -> Finding:
-    """Whether the extra endpoint is free.
+def tcp(endpoints: Mapping[str, str], process: int) -> list[Finding]:
+    """Whether the TCP endpoints are free.
 
     Args:
-        endpoint: of the configuration, such as tcp://127.0.0.1:9872; None when there is none.
+        endpoints: of the configuration, such as tcp://127.0.0.1:9872, by the key that names them.
         process: which runs the instance, 0 when none does.
     """
-    if endpoint is None:
-        return ok("no TCP endpoint is configured")
-    parts = urlsplit(endpoint)
-    host, port = (parts.hostname or "").replace("*", ""), parts.port or 0  # `*` is every address
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            trial.bind((host, port))
-        except OSError as error:
-            return _taken(endpoint, port, error, process)
-    return ok(f"{endpoint} is free")
+    return [_free(name, endpoint, process) for name, endpoint in endpoints.items()] or [
+        ok("no TCP endpoint is configured")
+    ]
+
+
+def keys(endpoints: Mapping[str, str], directory: KeyDirectory) -> Finding:
+    """Who may come in from other computers.
+
+    Args:
+        endpoints: of the configuration, by the key that names them.
+        directory: where this user's daemons have their keys.
+    """
+    guarded = [endpoint for name, endpoint in endpoints.items() if takes_keys(name, endpoint)]
+    if not guarded:
+        return ok("nothing is open to other computers")
+    opened = " and ".join(guarded)
+    try:
+        pair, clients = directory.pair(), directory.clients()
+    except ConfigError as error:
+        return problem(str(error), f"# {opened} cannot be opened before that is mended")
+    if pair is None:
+        return problem(f"{opened}: takes keys, and there are none in {directory.path}", own_command("keys", "make"))
+    if not clients:
+        return advice(
+            f"{opened}: open, but no client is listed in {directory.path}", own_command("keys", "make", "NAME")
+        )
+    listed = ", ".join(f"{name} (may only watch)" if key.watch_only else name for name, key in clients.items())
+    reach = (f"{endpoint} from {'this' if stays_here(endpoint) else 'every'} computer" for endpoint in guarded)
+    return ok(f"open to these keys: {listed}; {' and '.join(reach)}")
 
 
 def state(directory: Path) -> Finding:
@@ -124,17 +144,30 @@ def state_directory(name: str, environment: Mapping[str, str], home: Path) -> Pa
     return Path(environment.get("XDG_STATE_HOME") or home / ".local/state") / "hapticd" / name
 
 
-def _taken(endpoint: str, port: int, error: OSError, process: int) -> Finding:
+def _free(name: str, endpoint: str, process: int) -> Finding:
+    parts = urlsplit(endpoint)
+    host, port = (parts.hostname or "").replace("*", ""), parts.port or 0  # `*` is every address
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            return _taken(name, endpoint, port, error, process)
+    return ok(f"{endpoint} is free")
+
+
+def _taken(name: str, endpoint: str, port: int, error: OSError, process: int) -> Finding:
     if error.errno == errno.EADDRINUSE and process:
         return ok(f"{endpoint} is in use, by the running daemon as it seems")
     if error.errno == errno.EADDRINUSE:
         return problem(
             f"{endpoint} is taken by another program",
-            f"sudo ss -ltnp 'sport = :{port}'  # which one; or choose another telemetry.tcp",
+            f"sudo ss -ltnp 'sport = :{port}'  # which one; or choose another {name}",
         )
     if error.errno == errno.EACCES:
-        return problem(f"{endpoint}: {error.strerror}", "# in the configuration, [telemetry]: a port of 1024 or more")
-    return problem(f"{endpoint}: {error.strerror}", "ip address show lo  # it must have this address")
+        return problem(f"{endpoint}: {error.strerror}", f"# in the configuration, {name}: a port of 1024 or more")
+    return problem(f"{endpoint}: {error.strerror}", "ip address show  # an interface must have this address")
 
 
 def _nearest(directory: Path) -> Path:

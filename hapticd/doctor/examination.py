@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hapticd.doctor import configuration, endpoints, kernel, library, memory, processor, rules, scheduling, usb
+from hapticd.doctor import configuration, driver, endpoints, kernel, memory, processor, rules, scheduling, usb
 from hapticd.doctor.attempt import attempt
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.finding import Check, Finding, Mark, examine, ok
 from hapticd.doctor.latency import Latency, judge, measure
 from hapticd.doctor.tree import ROOT
+from hapticd.keys.directory import KeyDirectory, key_directory
 from hapticd.telemetry.endpoint import runtime_directory
 
 SCHEMA = 1
@@ -42,7 +43,8 @@ class Examination:
 
     def checks(self) -> list[Check]:
         """Every check except the measurement."""
-        root, loop, driver = self.root, self.wanted.loop, self.wanted.driver
+        root, loop, name = self.root, self.wanted.loop, self.wanted.driver
+        options = self.wanted.loaded.options if self.wanted.loaded else None
         home = Path(self.environment.get("HOME", "/"))
         directory = runtime_directory(self.instance)
         tried = functools.cache(lambda: attempt(loop.priority))
@@ -61,16 +63,17 @@ class Examination:
             Check("scheduling.quota", "quota", lambda: scheduling.quota(root, _or_none(daemon))),
             Check("memory.locking", "memory", lambda: memory.locking(loop, tried().memory, root)),
             Check("memory.swap", "swap", lambda: memory.swap(tried().memory, root)),
-            Check("usb.devices", "devices", lambda: usb.devices(driver, root)),
-            Check("usb.kernel_drivers", "bound driver", lambda: usb.kernel_drivers(driver, root)),
-            Check("usb.controller", "controller", lambda: usb.controller(driver, root)),
-            Check("usb.library", "libusb", lambda: usb.library(driver, root)),
-            Check("library.vendor", "SDK", lambda: library.vendor(driver, self.environment, home, root)),
-            Check("rules.installed", "udev rule", lambda: rules.installed(driver, root)),
+            Check("usb.devices", "devices", lambda: usb.devices(name, root)),
+            Check("usb.kernel_drivers", "bound driver", lambda: usb.kernel_drivers(name, root)),
+            Check("usb.controller", "controller", lambda: usb.controller(name, root)),
+            Check("usb.library", "libusb", lambda: usb.library(name, root)),
+            Check("driver.needs", "driver", lambda: driver.needs(name, options)),
+            Check("rules.installed", "udev rule", lambda: rules.installed(name, root)),
             Check("configuration.usable", "config", lambda: configuration.usable(self.wanted)),
             Check("endpoints.instance", "instance", lambda: endpoints.instance(self.instance, daemon())),
             Check("endpoints.runtime", "directory", lambda: endpoints.runtime(directory)),
             Check("endpoints.tcp", "endpoint", lambda: endpoints.tcp(self.wanted.tcp, _or_none(daemon))),
+            Check("endpoints.keys", "keys", lambda: endpoints.keys(self.wanted.tcp, KeyDirectory(key_directory()))),
             Check("endpoints.state", "disk", lambda: endpoints.state(state)),
         ]
 

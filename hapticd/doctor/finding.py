@@ -84,7 +84,7 @@ def examine(check: Check) -> list[Finding]:
     except Exception as error:  # noqa: BLE001 - a check that fails must not take the others with it
         findings = [unknown(f"{type(error).__name__}: {error}")]
     return [
-        replace(finding, check=check.name, title=check.title, mend=tuple(map(_for_this_user, finding.mend)))
+        replace(finding, check=check.name, title=check.title, mend=tuple(map(for_this_user, finding.mend)))
         for finding in findings
     ]
 
@@ -96,6 +96,7 @@ def own_command(*words: str) -> str:
     return shlex.join([program, *words])
 
 
-def _for_this_user(command: str) -> str:
-    """Root needs no sudo, and a small system has none."""
+def for_this_user(command: str) -> str:
+    """A command as this user can type it: root needs no sudo, and sudo does not find every hapticd."""
+    command = command.replace("sudo hapticd ", f"sudo {own_command()} ")
     return command if os.geteuid() else command.replace("sudo ", "")

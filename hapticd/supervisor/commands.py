@@ -1,4 +1,4 @@
-"""The control socket: requests from this computer, answered by whoever they are for.
+"""The control socket: requests from this computer, and from others with keys, answered by whoever they are for.
 
 A request is one msgpack map with the key `do`; the answer is one with `ok` and `text`. What is not understood is
 refused by name, and nothing that arrives can raise.
@@ -15,6 +15,8 @@ import msgpack
 import zmq
 
 from hapticd.contracts.errors import InstanceError
+from hapticd.keys.directory import KeyRing
+from hapticd.keys.gate import Gate
 
 _LARGEST_REQUEST = 1 << 16
 _MOST_AT_ONCE = 50
@@ -25,17 +27,20 @@ Reply = Callable[..., None]
 
 
 class CommandSocket:
-    """A ROUTER on the instance's runtime directory.
+    """A ROUTER on the instance's runtime directory, and on a TCP endpoint for those that have a key.
 
     Args:
         path: where the socket lies; its directory decides who may reach it.
+        tcp: the TCP endpoint; None for none.
+        ring: the keys that it takes.
 
     Raises:
         InstanceError: it cannot be bound.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, tcp: str | None = None, ring: KeyRing | None = None) -> None:
         self._path = path
+        self._gate: Gate | None = None
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.setsockopt(zmq.LINGER, _LAST_WORDS_MS)
@@ -46,9 +51,23 @@ class CommandSocket:
         except (zmq.ZMQError, OSError) as error:
             self.close()
             raise InstanceError(f"ipc://{path}: {error.strerror}; run as the user that owns the directory") from error
+        if tcp is not None:
+            self._bind_tcp(tcp, ring)
+
+    @property
+    def endpoint(self) -> str | None:
+        """The TCP endpoint as it was bound."""
+        return self._gate.endpoint if self._gate is not None else None
+
+    def admit(self, ring: KeyRing) -> None:
+        """Take other keys over; whoever is no longer listed is disconnected."""
+        if self._gate is not None:
+            self._gate.renew(ring.pair, ring.commanders())
 
     def receive(self) -> list[tuple[dict[str, Any], Reply]]:
         """Requests that have come, each with how to answer it; those that make no sense are answered here."""
+        if self._gate is not None:
+            self._gate.turn()
         requests = []
         for _ in range(_MOST_AT_ONCE):
             try:
@@ -66,8 +85,22 @@ class CommandSocket:
     def close(self) -> None:
         """Let go of the path; answers under way have a moment to leave."""
         self._socket.close()
+        if self._gate is not None:
+            self._gate.close()
         self._context.term()
         self._path.unlink(missing_ok=True)
+
+    def _bind_tcp(self, endpoint: str, ring: KeyRing | None) -> None:
+        try:
+            if ring is None:
+                raise InstanceError(f"{endpoint}: takes keys: make them with `hapticd keys make`")
+            self._gate = Gate(self._socket, endpoint, ring.pair, ring.commanders())
+        except zmq.ZMQError as error:
+            self.close()
+            raise InstanceError(f"{endpoint}: {zmq.strerror(error.errno or 0)}; set another control.tcp") from error
+        except InstanceError:
+            self.close()
+            raise
 
     def _replier(self, identity: bytes) -> Reply:
         def reply(ok: bool, text: str = "", **fields: Any) -> None:

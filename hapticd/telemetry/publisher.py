@@ -7,7 +7,6 @@ sees it by `seq`; nobody else notices.
 from __future__ import annotations
 
 import errno
-import ipaddress
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +19,9 @@ from hapticd.config.models import TelemetryConfig
 from hapticd.contracts.errors import InstanceError
 from hapticd.contracts.event import Event
 from hapticd.contracts.record import TickRecord
+from hapticd.keys.access import stays_here
+from hapticd.keys.directory import KeyRing
+from hapticd.keys.gate import Gate
 from hapticd.telemetry import wire
 from hapticd.telemetry.wire import INVALID, Inputs, Map, Topic, timestamp_s
 
@@ -67,6 +69,7 @@ class Publisher:
         ipc_path: where to publish to this computer, None for nowhere; `config.ipc` = false is obeyed as well.
         info: what the device reports besides its position.
         epoch_offset_ns: `wire.measure_epoch_offset_ns`, measured once at start.
+        ring: the keys that an endpoint for other computers takes; without them there can be none.
         input_every_tick: publish `hapticd/input` at every tick and not on change only.
 
     Raises:
@@ -79,6 +82,7 @@ class Publisher:
         ipc_path: Path | None,
         info: Inputs,
         epoch_offset_ns: int,
+        ring: KeyRing | None = None,
         *,
         input_every_tick: bool = False,
     ) -> None:
@@ -103,6 +107,7 @@ class Publisher:
         self.reconfigure(config)
 
         self._ipc_path: Path | None = None
+        self._gate: Gate | None = None
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.XPUB)
         try:
@@ -110,10 +115,10 @@ class Publisher:
             self._socket.setsockopt(zmq.SNDHWM, config.send_high_water)
             self._socket.setsockopt(zmq.LINGER, 0)
             self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
-            if config.tcp is not None:
-                self._bind_tcp(config.tcp)
             if config.ipc and ipc_path is not None:
                 self._bind_ipc(ipc_path)
+            if config.tcp is not None:
+                self._bind_tcp(config.tcp, ring)
         except BaseException:
             self.close()
             raise
@@ -132,6 +137,11 @@ class Publisher:
         """Take over batching and decimation from a reloaded file; endpoints stay as they were bound."""
         self._batch_ticks = config.batch_ticks
         self._every_ticks = config.every_ticks
+
+    def admit(self, ring: KeyRing) -> None:
+        """Take other keys over; whoever is no longer listed is disconnected."""
+        if self._gate is not None:
+            self._gate.renew(ring.pair, ring.watchers())
 
     def publish(self, records: Sequence[TickRecord]) -> None:
         """Publish ticks, oldest first. Full batches leave now, the rest with `flush`; cycles leave now."""
@@ -172,6 +182,8 @@ class Publisher:
 
     def service(self) -> None:
         """Answer new subscribers: the state of the daemon and of its buttons, at once. Returns at once."""
+        if self._gate is not None:
+            self._gate.turn()
         wanted: set[Topic] = set()
         for _ in range(_MOST_SUBSCRIPTIONS_AT_ONCE):
             # `recv` would raise when there is nothing; this costs a tenth of it.
@@ -198,6 +210,8 @@ class Publisher:
         if not self._socket.closed:
             self._send_batch()
         self._socket.close(linger=_LAST_WORDS_MS)
+        if self._gate is not None:
+            self._gate.close()
         self._context.term()  # returns when ZeroMQ's thread has let go of the path
         if self._ipc_path is not None:
             self._ipc_path.unlink(missing_ok=True)
@@ -257,23 +271,21 @@ class Publisher:
         self.counts.messages += 1
         self.counts.payload_bytes += len(payload)
 
-    def _bind_tcp(self, endpoint: str) -> None:
-        host, _, port = endpoint.removeprefix("tcp://").rpartition(":")
-        host = host.strip("[]")
-        try:
-            address = ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
-        except ValueError:
-            address = None
-        if address is None or not address.is_loopback:
+    def _bind_tcp(self, endpoint: str, ring: KeyRing | None) -> None:
+        if stays_here(endpoint):
+            self._socket.setsockopt(zmq.IPV6, "[" in endpoint)
+            self._bind(endpoint.replace("localhost", "127.0.0.1"))
+            return
+        if ring is None:
             raise InstanceError(
-                f"{endpoint}: off-host only with CURVE keys, which this version does not have; "
-                "set telemetry.tcp to a loopback address such as tcp://127.0.0.1:9872"
+                f"{endpoint}: other computers reach it, which takes keys: make them with `hapticd keys make`, or set "
+                "telemetry.tcp to a loopback address such as tcp://127.0.0.1:9872"
             )
-        if address.version == 6:
-            self._socket.setsockopt(zmq.IPV6, 1)
-            self._bind(f"tcp://[{address}]:{port}")
-        else:
-            self._bind(f"tcp://{address}:{port}")
+        try:
+            self._gate = Gate(self._socket, endpoint, ring.pair, ring.watchers())
+        except zmq.ZMQError as error:
+            raise _refused(endpoint, error) from error
+        self.endpoints.append(self._gate.endpoint)
 
     def _bind_ipc(self, path: Path) -> None:
         if path.exists() and not path.is_socket():
@@ -286,8 +298,12 @@ class Publisher:
         try:
             self._socket.bind(endpoint)
         except zmq.ZMQError as error:
-            raise InstanceError(f"{endpoint}: {_advice(error.errno or 0)}") from error
+            raise _refused(endpoint, error) from error
         self.endpoints.append(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
+
+
+def _refused(endpoint: str, error: zmq.ZMQError) -> InstanceError:
+    return InstanceError(f"{endpoint}: {_advice(error.errno or 0)}")
 
 
 def _advice(number: int) -> str:

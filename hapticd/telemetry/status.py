@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from hapticd.telemetry.wire import SCHEMA, Topic
@@ -67,11 +67,15 @@ class Status:
         device: what the device is.
         serial: its serial number, "" without one.
         simulated: no real device.
+        calibrated: the device knows where it is; until then its positions are nothing to rely on, and it takes no force.
+        device_metrics: numbers that its driver keeps, such as frames lost, since it was opened.
+        accuracy: the model that a simulated device got for the accuracy asked for, and why; "" when none was asked for.
         axes: names of its axes, in the order of positions and forces.
+        origin_m: where the device places the point that positions count from, an axis each [m]; 0 until tared.
         max_force_n: largest force that the guard lets through [N]; 0 when there is no limit.
         wall_axis: axis of each wall, in scene order.
         wall_position_m: where each wall is on its axis [m].
-        wall_stiffness_n_per_m: its stiffness as the file has it, before any change over time [N/m].
+        wall_stiffness_n_per_m: its stiffness now, with the changes over time that the file names [N/m].
         config_file: the file that is in force.
         config_hash: of its content.
         realtime: scheduling and memory are as the loop needs them.
@@ -110,7 +114,11 @@ class Status:
     device: str = ""
     serial: str = ""
     simulated: bool = False
+    calibrated: bool = True
+    device_metrics: dict[str, float] = field(default_factory=dict)
+    accuracy: str = ""
     axes: tuple[str, ...] = ()
+    origin_m: tuple[float, ...] = ()
     max_force_n: float = 0.0
     wall_axis: tuple[str, ...] = ()
     wall_position_m: tuple[float, ...] = ()

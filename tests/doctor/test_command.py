@@ -186,7 +186,7 @@ def test_misuse_is_told_from_a_problem(arguments: list[str]) -> None:
 def test_on_a_computer_that_tells_nothing_nothing_is_claimed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a sandbox without /proc and /sys: every check survives, and none says ok of what it could not see."""
     monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path / "run"))
-    wanted = Wanted(Path("lab.toml"), LoopConfig(), "omega7", None)
+    wanted = Wanted(Path("lab.toml"), LoopConfig(), "omega7", {})
     found = {finding.check: finding for finding in Examination(wanted, "default", tmp_path, {}).findings()}
     for check in ("kernel.preemption", "processor.count", "processor.governor", "scheduling.throttling", "memory.swap"):
         assert found[check].mark == "unknown", found[check]

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.doctor import library, rules, usb
+from hapticd.doctor import driver, rules, usb
 from hapticd.share import directory
 from tests.doctor.machine import Machine, says
-
-HOME = Path("/home/lab")
+from tests.drivers.plugin import install
 
 
 @pytest.fixture
@@ -151,41 +150,24 @@ def test_libusb_is_looked_for_by_those_who_load_it(machine: Machine) -> None:
     says(usb.library("omega7", machine.root), "ok", "/usr/lib/x86_64-linux-gnu")
 
 
-def test_a_missing_sdk_matters_to_its_driver_only(machine: Machine) -> None:
-    says(library.vendor("loopback", {}, HOME, machine.root), "ok", "not needed for the configured driver")
-    assert "ldconfig" in says(library.vendor("omega7", {}, HOME, machine.root), "problem", "no Force Dim").mend[1]
+# -- what the driver says itself
 
 
-@pytest.mark.parametrize(
-    ("name", "mark", "word"),
-    [
-        ("libdhd.so.3.17.6", "ok", "3.17.6"),
-        ("libdrd.so.3.15.1", "advice", "3.15.1"),
-        ("libdhd.so.3.9.0", "problem", "too old"),
-        ("libdrd.so.3", "ok", "SDK in /usr/local/lib"),
-    ],
-)
-def test_the_file_name_tells_the_version(machine: Machine, name: str, mark: str, word: str) -> None:
-    machine.file(f"usr/local/lib/{name}")
-    machine.file("usr/local/lib/libdhdx.so.9.9")
-    says(library.vendor("omega7", {}, HOME, machine.root), mark, word)
+def test_a_driver_that_needs_nothing_is_well() -> None:
+    says(driver.needs("loopback", None), "ok", "loopback needs nothing")
 
 
-def test_a_link_tells_the_version_of_what_it_links_to(machine: Machine) -> None:
-    machine.link("usr/local/lib/libdrd.so.3", machine.file("opt/sdk/libdrd.so.3.17.7"))
-    says(library.vendor("omega7", {}, HOME, machine.root), "ok", "3.17.7")
+def test_what_the_driver_says_is_what_the_doctor_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, monkeypatch, "diagnose(cls, options=None): return [Diagnosis('problem', 'no lib', ('get',))]")
+    says(driver.needs("odd", None), "problem", "no lib")
 
 
-def test_the_variable_comes_before_the_system(machine: Machine) -> None:
-    machine.file("usr/local/lib/libdhd.so.3.14.0")
-    machine.file("opt/sdk/lib/release/lin-x86_64-gcc/libdhd.so.3.17.0")
-    says(library.vendor("omega7", {"FDSDK": "/opt/sdk"}, HOME, machine.root), "ok", "3.17.0", "lin-x86_64-gcc")
-
-
-def test_a_library_in_a_home_is_hidden_from_the_service(machine: Machine) -> None:
-    machine.file("home/lab/.local/lib/libdrd.so.3.17.6")
-    found = says(library.vendor("omega7", {}, HOME, machine.root), "advice", "service may not look")
-    assert "/home/lab/.local/lib/lib*.so*" in found.mend[0]
+@pytest.mark.parametrize("body", ["raise ValueError('odd')", "os.abort()", "return 1"])
+def test_a_driver_that_cannot_say_is_no_finding_about_the_computer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str
+) -> None:
+    install(tmp_path, monkeypatch, f"diagnose(cls, options=None): {body}")
+    says(driver.needs("odd", None), "unknown", "odd: ")
 
 
 # -- rules

@@ -6,6 +6,7 @@ import fcntl
 import os
 import shutil
 import socket
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +15,8 @@ import pytest
 from hapticd.doctor import configuration, endpoints
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.finding import Check, examine
+from hapticd.keys.directory import KeyDirectory
+from hapticd.keys.file import new_pair
 from hapticd.share import directory
 from hapticd.supervisor.instance import InstanceLock
 from tests.doctor.machine import says
@@ -90,14 +93,39 @@ def test_a_path_longer_than_a_socket_address_is_refused_before_zeromq_does(tmp_p
 def test_an_endpoint_is_free_or_taken() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         endpoint = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        assert "ss -ltnp" in says(endpoints.tcp(endpoint, 0), "problem", "taken by another").mend[0]
-        says(endpoints.tcp(endpoint, 4711), "ok", "running daemon")
-    says(endpoints.tcp(endpoint, 0), "ok", "is free")
-    says(endpoints.tcp(None, 0), "ok", "no TCP endpoint")
+        (mend, *_) = says(endpoints.tcp({"control.tcp": endpoint}, 0), "problem", "taken by another").mend
+        assert "ss -ltnp" in mend
+        assert "another control.tcp" in mend
+        says(endpoints.tcp({"telemetry.tcp": endpoint}, 4711), "ok", "running daemon")
+    says(endpoints.tcp({"telemetry.tcp": endpoint}, 0), "ok", "is free")
+    says(endpoints.tcp({}, 0), "ok", "no TCP endpoint")
 
 
 def test_an_address_that_no_interface_has_is_named() -> None:
-    says(endpoints.tcp("tcp://192.0.2.1:9872", 0), "problem", "192.0.2.1")
+    says(endpoints.tcp({"telemetry.tcp": "tcp://192.0.2.1:9872"}, 0), "problem", "192.0.2.1")
+
+
+# -- who may come in from other computers
+
+
+def test_what_is_open_to_other_computers_is_told_with_whose_keys(tmp_path: Path) -> None:
+    keys = KeyDirectory(tmp_path / "keys")
+    here = {"telemetry.tcp": "tcp://127.0.0.1:9872"}
+    everywhere = {"telemetry.tcp": "tcp://0.0.0.0:9872", "control.tcp": "tcp://127.0.0.1:9873"}
+    says(endpoints.keys(here, keys), "ok", "nothing is open to other computers")
+    assert "keys make" in says(endpoints.keys(everywhere, keys), "problem", "there are none in").mend[0]
+    keys.make()
+    assert "keys make NAME" in says(endpoints.keys(everywhere, keys), "advice", "no client is listed").mend[0]
+    keys.add("laptop", new_pair())
+    keys.add("wall", replace(new_pair(), watch_only=True))
+    says(
+        endpoints.keys(everywhere, keys),
+        "ok",
+        "open to these keys: laptop, wall (may only watch)",
+        "tcp://0.0.0.0:9872 from every computer and tcp://127.0.0.1:9873 from this computer",
+    )
+    (keys.path / "clients" / "laptop.key").write_text("nonsense")
+    says(endpoints.keys(everywhere, keys), "problem", "laptop.key: no public-key")
 
 
 # -- the disk
@@ -138,7 +166,7 @@ def test_a_file_that_cannot_be_used_still_says_which_device_it_wants(tmp_path: P
     path.write_text("[loop]\nrate_hz = 2000\n[device]\ndriver = 'omega7'\nspeed = 3\n[telemetry]\ntcp = 5\n")
     wanted = Wanted.of(path)
     assert wanted.loaded is None
-    assert (wanted.driver, wanted.loop.rate_hz, wanted.tcp) == ("omega7", 2000.0, None)
+    assert (wanted.driver, wanted.loop.rate_hz, wanted.tcp) == ("omega7", 2000.0, {})
 
 
 @pytest.mark.parametrize("text", ["not toml", "device = 3\nloop = 'fast'", "[device]\ndriver = 7\n[loop]\ncpu = 'x'"])

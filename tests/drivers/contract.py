@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from hapticd.contracts.driver import Driver, DriverState
 from hapticd.contracts.errors import DriverStateError
+from hapticd.contracts.metric import MOST_METRICS
 
 AnyDriver = Driver[Any]
 
@@ -51,6 +53,13 @@ class DriverContract:
         assert 0.0 < info.safe_damping_n_s_per_m < math.inf
         assert info.host_silence_ms is None or info.host_silence_ms >= 0.0
         driver.close()
+
+    def test_its_metrics_have_names_of_their_own_and_start_at_zero(self, driver: AnyDriver) -> None:
+        names = [metric.name for metric in driver.METRICS]
+        assert len(set(names)) == len(names) <= MOST_METRICS
+        assert all(re.fullmatch("[a-z][a-z0-9_]*", name) for name in names)
+        assert all(metric.meaning for metric in driver.METRICS)
+        assert not any(driver.metrics)
 
     def test_samples_are_finite_and_have_one_element_an_axis(self, enabled: AnyDriver) -> None:
         info = enabled.info

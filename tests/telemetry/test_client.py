@@ -94,7 +94,12 @@ def test_every_topic_arrives_as_its_record() -> None:
 
 def test_a_status_comes_back_as_the_supervisor_filled_it_in() -> None:
     status = Status(
-        law="tdpa", axes=("x", "y"), late_histogram=(5, 0, 1), warnings=("not real-time: no rights",), armed=True
+        law="tdpa",
+        axes=("x", "y"),
+        late_histogram=(5, 0, 1),
+        warnings=("not real-time: no rights",),
+        armed=True,
+        device_metrics={"lost_frames": 3.0, "echo_us": 812.5},
     )
     with Wire(say_status=False) as wire:
         wire.publisher.status(status.as_map())

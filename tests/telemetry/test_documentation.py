@@ -39,8 +39,9 @@ def test_the_tables_name_every_key_and_no_other(topic: Topic) -> None:
     assert set(table) == set(fields)
     kinds = {"float": "float", "int": "int", "bool": "bool", "string": "str"}
     for key, kind in table.items():
-        word = re.sub(r"^array of (\d+ )?|,.*", "", kind)
+        word = re.sub(r"^(array|map) of (\d+ )?|,.*", "", kind)
         assert fields[key].startswith("tuple") == kind.startswith("array"), key
+        assert fields[key].startswith("dict") == kind.startswith("map"), key
         assert kinds[word] in fields[key], key
 
 
@@ -56,11 +57,13 @@ def test_the_page_shows_the_examples_as_they_are(language: str, name: str) -> No
     assert f"`docs/examples/{name}`:\n\n```{language}\n{(DOCS / 'examples' / name).read_text()}```\n" in PAGE
 
 
-def test_the_typed_example_compiles() -> None:
-    (snippet,) = re.findall(r"```python\n(from hapticd\.client.+?)```", PAGE, flags=re.DOTALL)
-    compile(snippet, "telemetry.md", "exec")
-    for name in re.findall(r"import (.+)", snippet)[0].split(", "):
-        assert hasattr(client, name)
+def test_the_typed_examples_compile() -> None:
+    snippets = re.findall(r"```python\n(from hapticd\.client.+?)```", PAGE, flags=re.DOTALL)
+    assert snippets
+    for snippet in snippets:
+        compile(snippet, "telemetry.md", "exec")
+        for name in re.findall(r"import (.+)", snippet)[0].split(", "):
+            assert hasattr(client, name)
 
 
 def printed_by(command: Sequence[str | Path]) -> list[str]:

@@ -255,7 +255,9 @@ def test_an_endpoint_that_cannot_be_had_is_named_with_a_remedy(tmp_path: Path) -
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.7", "*", "eth0", "[::]"])
 def test_only_this_computer_is_served_without_keys(host: str) -> None:
-    assert "off-host only with CURVE keys" in refusal(None, f"tcp://{host}:9872")
+    assert "other computers reach it, which takes keys: make them with `hapticd keys make`" in refusal(
+        None, f"tcp://{host}:9872"
+    )
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.9.9.9", "[::1]", "localhost"])

@@ -6,13 +6,15 @@ import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import usb.core
-
 from hapticd.contracts.driver import FoundDevice
 from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, DriverError, PluginError
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.models import FALCON_TYPE, MODELS
-from hapticd_drivers.forcedimension.sdk import Sdk
+from hapticd_drivers.forcedimension.presence import Obstacle, UsbDevice
+from hapticd_drivers.forcedimension.sdk import GET_SDK, Sdk
+
+ANY = "Force Dimension device"
+"""What a device is called that nobody could ask for its model."""
 
 _in_use: set[int] = set()
 """IDs that drivers of this process have open: the SDK gives them again to whoever opens the same device."""
@@ -26,11 +28,13 @@ class OpenDevice:
         id: the SDK's number for it.
         type: number of the kind of device.
         serial: serial number.
+        name: what it is called.
     """
 
     id: int
     type: int
     serial: int
+    name: str
 
 
 def open_device(sdk: Sdk, serial: int | None) -> OpenDevice:
@@ -45,14 +49,12 @@ def open_device(sdk: Sdk, serial: int | None) -> OpenDevice:
         if isinstance(found, DriverError):
             refusals.append(found)
         elif found.id in _in_use:
-            refusals.append(
-                DeviceBusyError(f"omega7: {_name(found.type)} {found.serial} is already open in this process")
-            )
+            refusals.append(DeviceBusyError(f"omega7: {found.name} {found.serial} is already open in this process"))
         elif (serial is None or found.serial == serial) and found.type in MODELS:
             _in_use.add(found.id)
             return found
         else:
-            others.append(f"{_name(found.type)} {found.serial}")
+            others.append(f"{found.name} {found.serial}")
             _release(sdk, found.id)
     if others and serial is not None and not refusals:
         raise DeviceNotFoundError(f"omega7: no device has serial number {serial}; there is {', '.join(others)}")
@@ -60,7 +62,7 @@ def open_device(sdk: Sdk, serial: int | None) -> OpenDevice:
         raise _told(sdk, refusals[0])
     if others:
         raise DeviceNotFoundError(f"omega7: hapticd does not know how to use {', '.join(others)}")
-    raise presence.explain()
+    raise presence.explain().error()
 
 
 def close_device(sdk: Sdk, device_id: int) -> None:
@@ -75,37 +77,42 @@ def find_devices(library: str | None = None) -> list[FoundDevice]:
     Args:
         library: where the SDK is, as in [device.options].
     """
-    try:
-        on_bus = presence.look()
-    except usb.core.NoBackendError:
-        on_bus = []
-    devices = []
+    on_bus = presence.look()
     try:
         sdk = Sdk(library)
-        for found in _each(sdk):
-            if isinstance(found, DriverError):
-                devices.append(FoundDevice("Force Dimension device", "", problem=str(_told(sdk, found))))
-                continue
-            known = found.type in MODELS
-            calibrated = sdk.drdIsInitialized(found.id)
-            busy = found.id in _in_use
-            devices.append(
-                FoundDevice(
-                    _name(found.type),
-                    str(found.serial),
-                    problem="" if known and not busy else "in use" if busy else "hapticd does not know how to use it",
-                    note="" if calibrated else "not calibrated since it was switched on: hapticd calibrate",
-                )
-            )
-            _release(sdk, found.id)
+        devices = [_described(sdk, found, on_bus) for found in _each(sdk)]
     except PluginError as error:
-        return [FoundDevice("Force Dimension device", "", device.where, str(error)) for device in on_bus]
-    if not devices:
-        reason = str(presence.explain()) if on_bus else ""
-        devices = [
-            FoundDevice("Force Dimension device", "", device.where, str(device.problem or reason)) for device in on_bus
-        ]
-    return devices
+        problem = str(error).removeprefix("omega7: ")
+        return [FoundDevice(ANY, "", device.where, problem, mend=GET_SDK) for device in on_bus]
+    return devices or [_unseen(device) for device in on_bus]
+
+
+def _described(sdk: Sdk, found: OpenDevice | DriverError, on_bus: list[UsbDevice]) -> FoundDevice:
+    """What the SDK has just opened, or would not open; it is open no longer afterwards."""
+    # Which of several devices on USB is which the SDK does not tell.
+    where = on_bus[0].where if len(on_bus) == 1 else ""
+    if isinstance(found, DriverError):
+        said = str(found).removeprefix("omega7: ")
+        obstacle = _obstacle(sdk, found)
+        if obstacle is None:
+            return FoundDevice(ANY, "", where, said)
+        return FoundDevice(ANY, "", where, f"{obstacle.text} ({said})", mend=obstacle.mend)
+    problem = note = ""
+    if found.type not in MODELS:
+        problem = "hapticd does not know how to use it"
+    elif found.id in _in_use:
+        problem = "in use"
+    elif not sdk.drdIsInitialized(found.id):
+        note = "not calibrated since it was switched on: hapticd calibrate, which moves the arm"
+    name = f"{found.name}, left-handed" if sdk.dhdIsLeftHanded(found.id) else found.name
+    _release(sdk, found.id)
+    return FoundDevice(name, str(found.serial), where, problem, note)
+
+
+def _unseen(device: UsbDevice) -> FoundDevice:
+    """A device that USB shows and the SDK does not."""
+    obstacle = device.obstacle or presence.unseen(device)
+    return FoundDevice(ANY, "", device.where, obstacle.text, mend=obstacle.mend)
 
 
 def _each(sdk: Sdk) -> Iterator[OpenDevice | DriverError]:
@@ -117,7 +124,8 @@ def _each(sdk: Sdk) -> Iterator[OpenDevice | DriverError]:
             continue
         number = ctypes.c_ushort(0)
         sdk.dhdGetSerialNumber(ctypes.byref(number), device_id)
-        yield OpenDevice(device_id, sdk.dhdGetSystemType(device_id), number.value)
+        device_type = sdk.dhdGetSystemType(device_id)
+        yield OpenDevice(device_id, device_type, number.value, _name(sdk, device_id, device_type))
 
 
 def _release(sdk: Sdk, device_id: int) -> None:
@@ -126,21 +134,29 @@ def _release(sdk: Sdk, device_id: int) -> None:
 
 
 def _told(sdk: Sdk, refusal: DriverError) -> DriverError:
-    """A refusal with what else is known: who holds the device, or that USB does not let this user in."""
+    """A refusal with what else is known of its reason."""
+    obstacle = _obstacle(sdk, refusal)
+    return refusal if obstacle is None else obstacle.error(str(refusal))
+
+
+def _obstacle(sdk: Sdk, refusal: DriverError) -> Obstacle | None:
+    """What stands behind a refusal: USB does not let this user in, or somebody has the device. None: nobody knows."""
+    busy = isinstance(refusal, DeviceBusyError)
+    for device in presence.look():
+        # With several devices there may be several obstacles: one that fits goes before nothing.
+        if device.obstacle is not None and (device.obstacle.kind is DeviceBusyError or not busy):
+            return device.obstacle
     free = sdk.dhdGetAvailableCount() if sdk.has("dhdGetAvailableCount") else -1
-    try:
-        seen = [device.problem for device in presence.look() if device.problem is not None]
-    except usb.core.NoBackendError:
-        seen = []
-    if seen:
-        return type(seen[0])(f"{seen[0]} ({refusal})")
-    if isinstance(refusal, DeviceBusyError) or free == 0:
-        return DeviceBusyError(f"{refusal}: another program has the device; end it first")
-    return refusal
+    if busy or free == 0:
+        mend = "# end that program first; while the daemon runs, it is the daemon"
+        return Obstacle(DeviceBusyError, "another program has the device", (mend,))
+    return None
 
 
-def _name(device_type: int) -> str:
+def _name(sdk: Sdk, device_id: int, device_type: int) -> str:
+    if device_type in MODELS:
+        return MODELS[device_type].name
     if device_type == FALCON_TYPE:
         return "Novint Falcon"
-    model = MODELS.get(device_type)
-    return f"device of type {device_type}" if model is None else model.name
+    words = sdk.dhdGetSystemName(device_id) if sdk.has("dhdGetSystemName") else None
+    return f"{(words or b'device').decode(errors='replace')} of type {device_type}"

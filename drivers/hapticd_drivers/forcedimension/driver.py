@@ -10,9 +10,11 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 
+from hapticd.contracts.diagnosis import Diagnosis
 from hapticd.contracts.driver import DeviceInfo, Driver, DriverState, FoundDevice, Sample
-from hapticd.contracts.errors import ConfigError, DeviceFaultError, DriverStateError, PluginError
-from hapticd_drivers.forcedimension import discovery, presence, settings
+from hapticd.contracts.errors import ConfigError, DeviceFaultError, DriverStateError
+from hapticd.contracts.metric import Metric
+from hapticd_drivers.forcedimension import diagnosis, discovery, presence, settings
 from hapticd_drivers.forcedimension.failures import TIMEOUT, cause_of
 from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ
 from hapticd_drivers.forcedimension.options import ForceDimensionOptions
@@ -31,21 +33,22 @@ SETTLE_S = 0.1
 STOP_ATTEMPTS = 5
 """How often `dhdStop` is tried before forces are switched off another way."""
 
+_CACHED_SAMPLES, _SATURATED_FORCES = range(2)
+"""Places in `ForceDimension.METRICS`."""
+
 
 class ForceDimension(Driver[ForceDimensionOptions]):
-    """Omega.7 and the other Force Dimension devices, through the vendor's SDK.
-
-    Attributes:
-        saturated: forces so far that the motors could not give in full, and that were scaled down.
-        cached: samples so far that the SDK's TimeGuard gave again.
-    """
+    """Omega.7 and the other Force Dimension devices, through the vendor's SDK."""
 
     Options = ForceDimensionOptions
+    ABSENT = presence.PLUG_IT_IN
+    METRICS = (
+        Metric("cached_samples", "samples that the SDK's TimeGuard gave a second time"),
+        Metric("saturated_forces", "forces that the motors could not give in full and that were scaled down", True),
+    )
 
     def __init__(self, options: ForceDimensionOptions, period_s: float) -> None:
         super().__init__(options, period_s)
-        self.saturated = 0
-        self.cached = 0
         self._sdk: Sdk | None = None
         self._id = -1
         self._left = False
@@ -77,18 +80,13 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         return discovery.find_devices(None if options is None else options.library)
 
     @classmethod
-    def lacks(cls, options: ForceDimensionOptions | None = None) -> str:
-        """What this driver needs and this computer has not, a line for people; "" when nothing."""
-        try:
-            Sdk(None if options is None else options.library)
-        except PluginError as error:
-            return str(error)
-        return ""
+    def diagnose(cls, options: ForceDimensionOptions | None = None) -> list[Diagnosis]:
+        """Which SDK there is, whether it will do, and how many devices it counts; opens none.
 
-    @staticmethod
-    def present() -> bool:
-        """Whether a device is plugged in: to be asked again and again, where `open` would scan all of USB."""
-        return presence.present()
+        Args:
+            options: where the SDK is.
+        """
+        return diagnosis.diagnose(options or ForceDimensionOptions())
 
     def _open(self) -> DeviceInfo:
         options = self.options
@@ -98,6 +96,8 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         model = MODELS[found.type]
         self._left = sdk.dhdIsLeftHanded(device)
         buttons = 1 if options.gripper_button else model.buttons
+        self._prepare(sdk, model.wrist, model.gripper, buttons)
+        self._stop_what_was_left_on()
         max_force_n = model.max_force_n if options.max_force_n is None else options.max_force_n
         if max_force_n > model.max_force_n:
             raise ConfigError(
@@ -107,8 +107,6 @@ class ForceDimension(Driver[ForceDimensionOptions]):
             raise ConfigError(f"device.options.gripper_button = true: a {model.name} has no gripper")
         settings.configure(sdk, device, options)
         silence_ms = settings.set_watchdog(sdk, device, options.watchdog_ms, self.period_s)
-        self._prepare(sdk, model.wrist, model.gripper, buttons)
-        self._stop_what_was_left_on()
         return DeviceInfo(
             model=f"{model.name}, left-handed" if self._left else model.name,
             serial=str(found.serial),
@@ -146,6 +144,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
                 "omega7: the device has not been calibrated since it was switched on: clear its workspace, then "
                 "`hapticd calibrate`, which moves the arm"
             )
+        self._sample.calibrated = True
         self._until_status = self.options.status_every_ticks
         self._settling = math.ceil(SETTLE_S / self.period_s)
         self._forces_seen = False
@@ -166,7 +165,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         if result:
             if result < 0:
                 raise self._opened().failure("reading the position")
-            self.cached += 1
+            self.metrics[_CACHED_SAMPLES] += 1.0
         sample = self._sample
         if not result:
             sample.sequence += 1
@@ -203,7 +202,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
             if result < 0:
                 raise self._opened().failure("setting the force")
             if result == SATURATED:
-                self.saturated += 1
+                self.metrics[_SATURATED_FORCES] += 1.0
 
     def _disable(self) -> None:
         sdk = self._sdk
@@ -228,7 +227,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         """Every call of a tick with its buffers, made once: the tick allocates nothing but the calls."""
         device = self._id
         self._sample = Sample(3)
-        self.saturated = self.cached = 0
+        self._sample.calibrated = sdk.drdIsInitialized(device)
         self._has_wrist = wrist
         self._button_bits = (1 << buttons) - 1
         position = [ctypes.byref(number) for number in self._position]
@@ -259,10 +258,11 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         self._sample.velocity_m_per_s[:] = (0.0, 0.0, 0.0)
 
     def _look_at_status(self) -> None:
-        """Notice that the device has taken the force away by itself, and say why."""
+        """Notice that the device has taken the force away by itself, and say why; without force, whether it may."""
         every = self.options.status_every_ticks
         self._until_status = every
         if self.state is not DriverState.ENABLED:
+            self._sample.calibrated = self._opened().drdIsInitialized(self._id)
             return
         if self._get_status() < 0:
             raise self._opened().failure("dhdGetStatus")

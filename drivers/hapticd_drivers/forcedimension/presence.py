@@ -24,7 +24,29 @@ VENDOR = 0x1451
 RULE = 'SUBSYSTEM=="usb", ATTR{idVendor}=="1451", MODE="0660", GROUP="plugdev", TAG+="uaccess"'
 """The one line of a udev rule that lets a user open the device; hapticd's own rules do the same."""
 
+PLUG_IT_IN = "plug it in, and switch its power supply on: lsusb shows 1451:..."
+
 _FALCON = (0x0403, 0xCB48)
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """What keeps this user from a device.
+
+    Attributes:
+        kind: the error that it is.
+        text: what is so.
+        mend: lines for a shell that mend it, or comments.
+    """
+
+    kind: type[DriverError]
+    text: str
+    mend: tuple[str, ...]
+
+    def error(self, cause: str = "") -> DriverError:
+        """The same to raise; `cause` is what the SDK said."""
+        said = f" ({cause.removeprefix('omega7: ')})" if cause else ""
+        return self.kind(f"omega7: {self.text}{said}: {'; '.join(line.removeprefix('# ') for line in self.mend)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,27 +56,16 @@ class UsbDevice:
     Attributes:
         product: USB product number.
         where: bus and address, `001:005`.
-        problem: what keeps this user from it; None when nothing on USB does.
+        obstacle: what keeps this user from it; None when nothing on USB does.
     """
 
     product: int
     where: str
-    problem: DriverError | None
-
-
-def present(backend: Any = None) -> bool:
-    """Whether a Force Dimension device is plugged in, or USB cannot be asked.
-
-    It is cheap and leaves the device alone, where each attempt to open one has the SDK scan all of USB.
-    """
-    try:
-        return any(device.idVendor == VENDOR for device in _on_bus(backend))
-    except usb.core.NoBackendError:
-        return True
+    obstacle: Obstacle | None
 
 
 def look(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: Path = Path("/proc")) -> list[UsbDevice]:
-    """Every Force Dimension device on USB, and what is wrong with each.
+    """Every Force Dimension device on USB, and what is wrong with each; none when USB cannot be asked.
 
     Args:
         backend: pyusb backend; None takes libusb.
@@ -62,15 +73,16 @@ def look(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: Pat
         processes: where the processes are.
     """
     found = []
-    for device in _on_bus(backend):
-        if device.idVendor == VENDOR:
-            where = f"{device.bus or 0:03d}:{device.address or 0:03d}"
-            node = nodes / where[:3] / where[4:]
-            found.append(UsbDevice(device.idProduct, where, _problem(device, node, processes)))
+    with contextlib.suppress(usb.core.NoBackendError):
+        for device in _on_bus(backend):
+            if device.idVendor == VENDOR:
+                where = f"{device.bus or 0:03d}:{device.address or 0:03d}"
+                node = nodes / where[:3] / where[4:]
+                found.append(UsbDevice(device.idProduct, where, _obstacle(device, node, processes)))
     return found
 
 
-def explain(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: Path = Path("/proc")) -> DriverError:
+def explain(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: Path = Path("/proc")) -> Obstacle:
     """Why the SDK finds no device.
 
     Args:
@@ -79,28 +91,32 @@ def explain(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: 
         processes: where the processes are.
     """
     try:
-        seen = look(backend, nodes, processes)
         others = {(device.idVendor, device.idProduct) for device in _on_bus(backend)}
     except usb.core.NoBackendError:
-        return DeviceNotFoundError(
-            "omega7: no device found; libusb-1.0 is not installed, which the SDK needs as well: "
-            "sudo apt install libusb-1.0-0"
+        return Obstacle(
+            DeviceNotFoundError,
+            "no device found; libusb-1.0 is not installed, which the SDK needs as well",
+            ("sudo apt install libusb-1.0-0",),
         )
-    for device in seen:
-        if device.problem is not None:
-            return device.problem
+    seen = look(backend, nodes, processes)
     if seen:
-        name = f"{VENDOR:04x}:{seen[0].product:04x}, {seen[0].where}"
-        return DeviceNotFoundError(
-            f"omega7: a Force Dimension device is on USB ({name}) and may be opened, yet the SDK does not find it: "
-            "switch it off and on again; if that does not help, the SDK may be older than the device"
-        )
+        return next((device.obstacle for device in seen if device.obstacle is not None), None) or unseen(seen[0])
     if _FALCON in others:
-        return DeviceNotFoundError(
-            "omega7: only a Novint Falcon is plugged in, which is not driven through the Force Dimension SDK"
+        return Obstacle(
+            DeviceNotFoundError,
+            "only a Novint Falcon is plugged in, which is not driven through the Force Dimension SDK",
+            (f"# {PLUG_IT_IN}",),
         )
-    return DeviceNotFoundError(
-        "omega7: no Force Dimension device is on USB: plug it in, and switch its power supply on (lsusb shows 1451:...)"
+    return Obstacle(DeviceNotFoundError, "no Force Dimension device is on USB", (f"# {PLUG_IT_IN}",))
+
+
+def unseen(device: UsbDevice) -> Obstacle:
+    """That the SDK does not find a device which nothing on USB keeps from it."""
+    name = f"{VENDOR:04x}:{device.product:04x}, {device.where}"
+    return Obstacle(
+        DeviceNotFoundError,
+        f"a Force Dimension device is on USB ({name}) and may be opened, yet the SDK does not find it",
+        ("# switch it off and on again; if that does not help, the SDK may be older than the device",),
     )
 
 
@@ -109,24 +125,40 @@ def _on_bus(backend: Any) -> Iterator[Any]:
     return found
 
 
-def _problem(device: Any, node: Path, processes: Path) -> DriverError | None:
+def _obstacle(device: Any, node: Path, processes: Path) -> Obstacle | None:
     name = f"a Force Dimension device is on USB ({VENDOR:04x}:{device.idProduct:04x})"
-    # By the effective user: that is whom the kernel will ask.
-    if node.exists() and not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
-        return DevicePermissionError(
-            f"omega7: {name} but this user may not open {node}; install the rule: sudo hapticd service install, then "
-            f"replug; or write it yourself to /etc/udev/rules.d/70-force-dimension.rules: {RULE}"
+    if not _may_open(node):
+        return Obstacle(
+            DevicePermissionError,
+            f"{name} but this user may not open {node}",
+            (
+                "sudo hapticd service install",
+                "# then replug it; or only the rule, without the service:",
+                f"echo '{RULE}' | sudo tee /etc/udev/rules.d/70-force-dimension.rules && sudo udevadm control --reload",
+            ),
         )
     holder = _holder(node, processes)
     if holder:
-        return DeviceBusyError(f"omega7: {name} but {holder} has it open; end that program first")
+        return Obstacle(DeviceBusyError, f"{name} but {holder} has it open", ("# end that program first",))
     with contextlib.suppress(usb.core.USBError, NotImplementedError):
         if device.is_kernel_driver_active(0):
-            return DeviceBusyError(
-                f"omega7: {name} but a kernel driver has taken its interface; `lsusb -t` names the driver, and "
-                "`sudo modprobe -r DRIVER` frees the device"
+            return Obstacle(
+                DeviceBusyError,
+                f"{name} but a kernel driver has taken its interface",
+                ("lsusb -t  # names the driver", "sudo modprobe -r DRIVER"),
             )
     return None
+
+
+def _may_open(node: Path) -> bool:
+    """Whether the kernel lets this user open a node, which it alone knows: there are ACLs, and rules of containers."""
+    try:
+        os.close(os.open(node, os.O_RDWR | os.O_CLOEXEC))
+    except PermissionError:
+        return False
+    except OSError:  # there is no node, or the device is just going away
+        pass
+    return True
 
 
 def _holder(node: Path, processes: Path) -> str:

@@ -19,7 +19,13 @@ NAME = "libdrd.so.3"
 OLDEST = (3, 14)
 ADVISED = (3, 16)
 
-_ENVIRONMENT = ("FDSDK", "FORCEDIM_SDK")
+GET_SDK = (
+    "# download the SDK from forcedimension.com and unpack it, then in its directory:",
+    "sudo cp -a lib/release/lin-*/lib*.so* /usr/local/lib/ && sudo ldconfig",
+)
+"""What puts the SDK where it is found."""
+
+ENVIRONMENT = ("FDSDK", "FORCEDIM_SDK")
 _USUAL = (Path("/usr/local/lib"), Path("~/.local/lib"))
 
 
@@ -52,8 +58,8 @@ class Sdk:
         self.version = self._version()
         if self.version != (0, 0, 0, 0) and self.version[:2] < OLDEST:
             raise PluginError(
-                f"omega7: {self.path} is SDK {_dotted(self.version)}; hapticd needs {_dotted(OLDEST)} or newer, "
-                f"better {_dotted(ADVISED)}"
+                f"omega7: {self.path} is SDK {dotted(self.version)}; hapticd needs {dotted(OLDEST)} or newer, "
+                f"better {dotted(ADVISED)}"
             )
         missing = sorted(name for name in PROTOTYPES if not self.has(name) and name not in OPTIONAL)
         if missing:
@@ -62,7 +68,7 @@ class Sdk:
             )
 
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"SDK {_dotted(self.version)} has no {name}")
+        raise AttributeError(f"SDK {dotted(self.version)} has no {name}")
 
     def has(self, name: str) -> bool:
         """Whether this SDK has a function."""
@@ -76,7 +82,7 @@ class Sdk:
             PluginError: this SDK does not have it.
         """
         if not self.has(name):
-            raise PluginError(f"omega7: SDK {_dotted(self.version)} has no {name}, which the configuration asks for")
+            raise PluginError(f"omega7: SDK {dotted(self.version)} has no {name}, which the configuration asks for")
         result: int = getattr(self, name)(*arguments)
         if result < 0:
             raise self.failure(name)
@@ -119,8 +125,13 @@ def candidates(library: str | None) -> list[Path]:
     if library is not None:
         named = Path(library).expanduser()
         return _within(named) if named.is_dir() else [named]
-    places = [Path(os.environ[name]) for name in _ENVIRONMENT if os.environ.get(name)]
+    places = [Path(os.environ[name]) for name in ENVIRONMENT if os.environ.get(name)]
     return [file for place in [*places, *_USUAL] for file in _within(place.expanduser())]
+
+
+def dotted(version: tuple[int, ...]) -> str:
+    """A version as it is written: 3.17.6."""
+    return ".".join(map(str, version))
 
 
 def _within(place: Path) -> list[Path]:
@@ -159,7 +170,3 @@ def _function(handle: ctypes.CDLL, name: str) -> Any:
         return getattr(handle, name)
     except AttributeError:
         return None
-
-
-def _dotted(version: tuple[int, ...]) -> str:
-    return ".".join(map(str, version))

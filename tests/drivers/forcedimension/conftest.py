@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from hapticd_drivers.forcedimension import discovery
-from tests.drivers.forcedimension.bench import Bench, build
+from tests.drivers.forcedimension.bench import Bench
+from tests.drivers.forcedimension.building import build
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import zmq
 from tests.daemon.running import PATIENCE_S, Daemon
 from tests.drivers.forcedimension.bench import Bench
 
+AXES = ("x", "y", "z")
 PRESS_N = 3.0
 WALL_M = -0.01
 SLOW = 0.02
@@ -21,7 +22,9 @@ SLOW = 0.02
 _STILL_M = 0.05e-3
 
 
-def config(bench: Bench, stiffness_n_per_m: float, law: str = "energy-cycle", rate_hz: float = 1000.0) -> str:
+def config(
+    bench: Bench, stiffness_n_per_m: float, law: str = "energy-cycle", rate_hz: float = 1000.0, axis: str = "z"
+) -> str:
     return f"""
         [loop]
         rate_hz = {rate_hz}
@@ -31,7 +34,7 @@ def config(bench: Bench, stiffness_n_per_m: float, law: str = "energy-cycle", ra
         [device.options]
         library = "{bench.directory}"
         [[scene.walls]]
-        axis = "z"
+        axis = "{axis}"
         position_m = {WALL_M}
         stiffness_n_per_m = {stiffness_n_per_m}
         [controller]
@@ -41,10 +44,11 @@ def config(bench: Bench, stiffness_n_per_m: float, law: str = "energy-cycle", ra
     """
 
 
-def press(bench: Bench, drop_m: float, rate_hz: float = 1000.0) -> None:
+def press(bench: Bench, drop_m: float, rate_hz: float = 1000.0, axis: str = "z") -> None:
     """Put the device above the wall, at rest, with a hand that presses."""
+    across = [float(name == axis) for name in AXES]
     bench.set(-1, period_us=1e6 / rate_hz)
-    bench.set(hand_n=[0.0, 0.0, -PRESS_N], position_m=[0.0, 0.0, WALL_M + drop_m])
+    bench.set(hand_n=[-PRESS_N * one for one in across], position_m=[(WALL_M + drop_m) * one for one in across])
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,7 @@ class Lab:
         stiffness_n_per_m: wall.
         rate_hz: of the loop.
         law: what stabilises the wall.
+        prepare: does more to the device before the daemon sees it.
     """
 
     def __init__(
@@ -83,6 +88,7 @@ class Lab:
         stiffness_n_per_m: float,
         rate_hz: float = 1000.0,
         law: str = "energy-cycle",
+        prepare: Callable[[Bench], None] = lambda _: None,
     ) -> None:
         self.file = file
         self.stiffness_n_per_m = stiffness_n_per_m
@@ -90,6 +96,7 @@ class Lab:
         self.bench = Bench(fake_sdk, file)
         press(self.bench, 0.003, rate_hz)
         self.bench.set(-1, wall_scale=SLOW, real_time=1)
+        prepare(self.bench)
         os.environ["FAKE_DHD_FILE"] = str(file)
         try:
             self.daemon = Daemon(config(self.bench, stiffness_n_per_m, law, rate_hz))

@@ -16,7 +16,8 @@ from hapticd.contracts.errors import PluginError
 from hapticd_drivers.forcedimension import sdk as sdk_module
 from hapticd_drivers.forcedimension.prototypes import OPTIONAL, PROTOTYPES, STATUS_WORDS
 from hapticd_drivers.forcedimension.sdk import Sdk
-from tests.drivers.forcedimension.bench import Bench, build
+from tests.drivers.forcedimension.bench import Bench
+from tests.drivers.forcedimension.building import build
 
 KINDS: dict[Any, str] = {
     ctypes.c_bool: "b",

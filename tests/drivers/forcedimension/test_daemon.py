@@ -12,7 +12,7 @@ import pytest
 
 from hapticd.contracts.event import EventCode
 from tests.daemon.running import Subscriber, wait_until
-from tests.drivers.forcedimension.bench import BRAKE, FORCE, SOFTWARE, WATCHDOG, Bench
+from tests.drivers.forcedimension.bench import BRAKE, FORCE, RESET, SOFTWARE, WATCHDOG, Bench
 from tests.drivers.forcedimension.lab import PRESS_N, Lab, rest_of
 
 LATE = {EventCode.LOOP_LATE, EventCode.LAW_OVER_BUDGET}
@@ -139,6 +139,19 @@ def test_the_force_button_latches_until_somebody_clears_and_arms(lab: Lab) -> No
         assert lab.look().get("mode") == FORCE
 
 
+def test_forces_that_the_motors_cannot_give_are_told_once_and_counted_in_the_status(lab: Lab) -> None:
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        assert subscriber.until("hapticd/status")["device_metrics"]["saturated_forces"] == 0.0
+        lab.look().set(motor_n=0.97 * PRESS_N, viscous_n_s_per_m=300.0)  # pushed through the wall, but slowly
+        warning = subscriber.until("hapticd/event", code=EventCode.DEVICE_WARNING)
+        assert warning["metric"] == "saturated_forces"
+        told = warning["value"]
+        assert told >= 1.0
+        while subscriber.until("hapticd/status")["device_metrics"]["saturated_forces"] < told + 20.0:
+            pass
+        assert lab.look().get("mode") == FORCE
+
+
 def test_an_unplugged_device_comes_back(lab: Lab) -> None:
     with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
         subscriber.until("hapticd/status")  # it is connected
@@ -155,6 +168,27 @@ def test_sigterm_ramps_out_and_leaves_the_brakes_on(lab: Lab) -> None:
     assert lab.daemon.wait_exit() == 0
     assert lab.look().get("mode") == BRAKE
     assert lab.look().get("moves") == 0
+
+
+@pytest.mark.usefixtures("bench")
+def test_a_device_that_was_just_switched_on_says_so_and_is_no_fault_until_it_is_calibrated(
+    fake_sdk: Path, tmp_path: Path
+) -> None:
+    """Its positions are nonsense: it does not know where it is."""
+
+    def switch_on(bench: Bench) -> None:
+        bench.set(calibrated=0, mode=RESET, position_m=[0.7, -0.5, 0.9], hand_n=[0.0, 0.0, 0.0], auto_init_us=1000)
+
+    with Lab(fake_sdk, tmp_path / "device", 12000.0, prepare=switch_on) as lab:
+        with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+            subscriber.until("hapticd/status", calibrated=False, armed=False, latched=False)
+            assert "not been calibrated" in lab.ask("arm")
+            assert lab.look().get("moves") == 0
+            assert lab.ask("calibrate") == ""
+            subscriber.until("hapticd/status", calibrated=True, latched=False, fault_code=0)
+        assert lab.ask("arm") == ""
+        assert lab.look().get("mode") == FORCE
+        assert "not possible" not in lab.daemon.output()
 
 
 def test_calibration_moves_the_arm_once_it_is_disarmed_and_the_loop_goes_on(lab: Lab) -> None:

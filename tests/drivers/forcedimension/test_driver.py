@@ -146,9 +146,23 @@ def test_nothing_moves_the_arm_but_calibrate(bench: Bench) -> None:
     assert bench.log() == ["drdIsSupported", "drdAutoInit", "drdStop", "dhdStop", "drdIsInitialized"]
     assert (bench.get("moves"), bench.get("mode"), bench.get("regulating")) == (1, BRAKE, 0)
     driver.enable()
-    driver.read()
+    assert driver.read().calibrated
     driver.close()
     assert bench.get("moves") == 1
+
+
+def test_an_arm_that_was_put_into_its_pit_by_hand_is_seen_to_be_calibrated(bench: Bench) -> None:
+    bench.set(calibrated=0)
+    driver = bench.driver(status_every_ticks=3)
+    driver.open()
+    assert not driver.read().calibrated
+    bench.set(calibrated=1)
+    seen = [driver.read().calibrated for _ in range(6)]
+    assert seen[-1]
+    assert not seen[0]
+    driver.enable()
+    assert driver.read().calibrated
+    driver.close()
 
 
 def test_a_calibration_that_fails_leaves_no_force(bench: Bench) -> None:
@@ -203,7 +217,7 @@ def test_a_sample_that_the_time_guard_gave_again_is_a_success_and_does_not_count
     first = driver.read().sequence
     bench.set(-1, held=1)
     assert [driver.read().sequence for _ in range(3)] == [first] * 3
-    assert driver.cached == 3
+    assert driver.metrics[0] == 3.0
     bench.advance(200)
     assert driver.read().sequence == first + 1
     driver.close()
@@ -216,9 +230,9 @@ def test_a_force_that_the_motors_scale_down_is_a_success_and_is_counted(bench: B
     driver.enable()
     driver.write([6.0, 0.0, 8.0])
     assert bench.vector("force_n") == pytest.approx([3.0, 0.0, 4.0])
-    assert driver.saturated == 1
+    assert driver.metrics[1] == 1.0
     driver.write([0.0, 3.0, 0.0])
-    assert driver.saturated == 1
+    assert driver.metrics[1] == 1.0
     driver.close()
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
 from hapticd.contracts.driver import DriverState
-from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, PluginError
+from hapticd.contracts.errors import ConfigError, DeviceBusyError, DeviceNotFoundError, PluginError
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from hapticd_drivers.forcedimension.models import MODELS
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, RIGHT, Bench
@@ -46,11 +47,17 @@ def test_the_first_device_that_can_be_used_is_taken(bench: Bench) -> None:
     bench.set(-1, count=1)
     with pytest.raises(DeviceNotFoundError, match="does not know how to use Novint Falcon 1001"):
         bench.driver().open()
+    bench.set(0, type=206)
+    with pytest.raises(DeviceNotFoundError, match="does not know how to use fake haptic device of type 206 1001"):
+        bench.driver().open()
+    bench.set(-1, no_strings=1)
+    (found,) = ForceDimension.find(bench.driver().options)
+    assert (found.model, found.problem) == ("device of type 206", "hapticd does not know how to use it")
 
 
 def test_a_device_of_another_process_is_busy(bench: Bench) -> None:
     bench.set(holder=1)
-    with pytest.raises(DeviceBusyError, match=r"device already in use.*another program has the device"):
+    with pytest.raises(DeviceBusyError, match=r"another program has the device \(.*device already in use"):
         bench.driver().open()
 
 
@@ -87,18 +94,24 @@ def test_without_the_sdk_the_driver_says_how_to_get_it(tmp_path: Path) -> None:
     with pytest.raises(PluginError, match=r"SDK cannot be loaded \(.*no libdrd\.so in it\): install it and set FDSDK"):
         driver.open()
     assert driver.state is DriverState.CLOSED
-    assert "cannot be loaded" in ForceDimension.lacks(driver.options)
+    (diagnosis,) = ForceDimension.diagnose(driver.options)
+    assert (diagnosis.mark, "cannot be loaded" in diagnosis.text) == ("problem", True)
+    assert "forcedimension.com" in diagnosis.mend[0]
 
 
-def test_forces_that_a_dead_program_left_on_are_off_once_the_device_is_opened(bench: Bench) -> None:
+@pytest.mark.parametrize("options", [{}, {"max_force_n": 99.0}])
+def test_forces_that_a_dead_program_left_on_are_off_once_the_device_is_opened_even_with_bad_options(
+    bench: Bench, options: dict[str, float]
+) -> None:
     left = bench.driver()
     left.open()
     left.enable()
     left.write([0.0, 0.0, 3.0])
     bench.die()
     assert bench.get("mode") == FORCE
-    driver = bench.driver()
-    driver.open()
+    driver = bench.driver(**options)
+    with pytest.raises(ConfigError) if options else nullcontext():
+        driver.open()
     assert bench.get("mode") == BRAKE
     assert bench.vector("force_n") == [0.0, 0.0, 0.0]
     driver.close()

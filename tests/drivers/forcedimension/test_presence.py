@@ -18,7 +18,7 @@ from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, Devic
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from hapticd_drivers.forcedimension.options import ForceDimensionOptions
-from hapticd_drivers.forcedimension.presence import UsbDevice
+from hapticd_drivers.forcedimension.presence import Obstacle, UsbDevice
 from tests.drivers.forcedimension.bench import Bench
 
 FALCON = (0x0403, 0xCB48)
@@ -90,21 +90,20 @@ def nobody(nodes: Path) -> Iterator[None]:
 
 
 def test_nothing_is_plugged_in() -> None:
-    error = presence.explain(Usb((0x1D6B, 2)))
+    error = presence.explain(Usb((0x1D6B, 2))).error()
     assert isinstance(error, DeviceNotFoundError)
     assert "plug it in" in str(error)
-    assert not presence.present(Usb((0x1D6B, 2)))
 
 
 def test_only_a_falcon_is_plugged_in() -> None:
-    error = presence.explain(Usb(FALCON))
+    error = presence.explain(Usb(FALCON)).error()
     assert isinstance(error, DeviceNotFoundError)
     assert "only a Novint Falcon" in str(error)
 
 
 @pytest.mark.usefixtures("nobody")
 def test_this_user_may_not_open_it_and_the_rule_is_named(nodes: Path) -> None:
-    error = presence.explain(Usb(FALCON, OMEGA), nodes)
+    error = presence.explain(Usb(FALCON, OMEGA), nodes).error()
     assert isinstance(error, DevicePermissionError)
     assert "1451:0402" in str(error)
     assert str(nodes / "001" / "006") in str(error)
@@ -117,7 +116,7 @@ def test_another_process_has_it(nodes: Path, tmp_path: Path) -> None:
     (process / "fd").mkdir(parents=True)
     (process / "comm").write_text("chai3d-demo\n")
     (process / "fd" / "7").symlink_to(nodes / "001" / "005")
-    error = presence.explain(Usb(OMEGA), nodes, tmp_path / "proc")
+    error = presence.explain(Usb(OMEGA), nodes, tmp_path / "proc").error()
     assert isinstance(error, DeviceBusyError)
     assert "process 4242 (chai3d-demo) has it open" in str(error)
 
@@ -127,22 +126,21 @@ def test_a_real_process_that_has_the_node_open_is_found(nodes: Path) -> None:
     node = nodes / "001" / "005"
     with node.open() as opened, subprocess.Popen(["sleep", "60"], stdin=opened) as child:
         try:
-            assert f"process {child.pid} " in str(presence.explain(Usb(OMEGA), nodes))
+            assert f"process {child.pid} " in str(presence.explain(Usb(OMEGA), nodes).error())
         finally:
             child.kill()
 
 
 def test_a_kernel_driver_has_it(nodes: Path) -> None:
-    error = presence.explain(Usb(OMEGA, kernel_driver=True), nodes)
+    error = presence.explain(Usb(OMEGA, kernel_driver=True), nodes).error()
     assert isinstance(error, DeviceBusyError)
     assert "kernel driver" in str(error)
 
 
 def test_it_is_there_and_free_yet_the_sdk_does_not_see_it(nodes: Path) -> None:
-    error = presence.explain(Usb(OMEGA), nodes)
+    error = presence.explain(Usb(OMEGA), nodes).error()
     assert isinstance(error, DeviceNotFoundError)
     assert "switch it off and on again" in str(error)
-    assert presence.present(Usb(OMEGA))
 
 
 def test_without_libusb_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,15 +148,15 @@ def test_without_libusb_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
         raise usb.core.NoBackendError("No backend available")
 
     monkeypatch.setattr(usb.core, "find", none)
-    assert "libusb-1.0 is not installed" in str(presence.explain())
-    assert presence.present()
+    assert "libusb-1.0 is not installed" in presence.explain().text
+    assert presence.look() == []
 
 
 @pytest.fixture
 def on_bus(monkeypatch: pytest.MonkeyPatch) -> list[UsbDevice]:
     seen: list[UsbDevice] = []
     monkeypatch.setattr(presence, "look", lambda: seen)
-    monkeypatch.setattr(presence, "explain", lambda: DeviceNotFoundError("omega7: why"))
+    monkeypatch.setattr(presence, "explain", lambda: Obstacle(DeviceNotFoundError, "why", ("# do this",)))
     return seen
 
 
@@ -177,12 +175,30 @@ def test_find_without_the_sdk_still_shows_what_usb_shows(on_bus: list[UsbDevice]
 def test_find_without_a_device(on_bus: list[UsbDevice], bench: Bench) -> None:
     bench.set(-1, count=0)
     assert ForceDimension.find(options(bench.directory)) == []
-    on_bus.append(UsbDevice(0x0402, "001:005", DevicePermissionError("omega7: may not")))
+    on_bus.append(UsbDevice(0x0402, "001:005", Obstacle(DevicePermissionError, "may not", ("sudo may",))))
     on_bus.append(UsbDevice(0x0402, "001:006", None))
-    assert [found.problem for found in ForceDimension.find(options(bench.directory))] == [
-        "omega7: may not",
-        "omega7: why",
+    assert [(found.problem, found.mend) for found in ForceDimension.find(options(bench.directory))] == [
+        ("may not", ("sudo may",)),
+        (
+            "a Force Dimension device is on USB (1451:0402, 001:006) and may be opened, yet the SDK does not find it",
+            ("# switch it off and on again; if that does not help, the SDK may be older than the device",),
+        ),
     ]
+
+
+def test_a_device_that_is_held_is_not_put_down_to_another_one_that_this_user_may_not_open(
+    on_bus: list[UsbDevice], bench: Bench
+) -> None:
+    on_bus.append(UsbDevice(0x0402, "001:005", Obstacle(DevicePermissionError, "may not", ())))
+    on_bus.append(UsbDevice(0x0402, "001:006", None))
+    bench.set(0, holder=1)
+    (held,) = ForceDimension.find(options(bench.directory))
+    assert held.problem.startswith("another program has the device (")
+    assert held.where == ""
+    on_bus.insert(1, UsbDevice(0x0402, "001:007", Obstacle(DeviceBusyError, "process 42 has it", ("kill 42",))))
+    (held,) = ForceDimension.find(options(bench.directory))
+    assert held.problem.startswith("process 42 has it (")
+    assert held.mend == ("kill 42",)
 
 
 @pytest.mark.usefixtures("on_bus")

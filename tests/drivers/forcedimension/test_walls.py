@@ -1,4 +1,4 @@
-"""The paper's walls through the driver on the fake omega.7: a period passes with each tick, so one run decides."""
+"""The paper's walls on the fake omega.7 in the daemon's own loop, in the device's time: one run decides."""
 
 from __future__ import annotations
 
@@ -7,45 +7,105 @@ from typing import Any
 import pytest
 
 from hapticd.config.loading import parse
+from hapticd.config.models import MAX_WALLS
+from hapticd.contracts.event import EventCode
+from hapticd.contracts.record import RecordLayout
+from hapticd.control.loop import ControlLoop
 from hapticd.control.process import make_tick
+from hapticd.control.shared import EventReader, RecordReader, SharedMemory
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
 from tests.drivers.forcedimension.bench import LEFT, RIGHT, Bench
-from tests.drivers.forcedimension.lab import Rest, config, press, rest_of
+from tests.drivers.forcedimension.lab import AXES, Rest, config, press, rest_of
 
 
-def run(bench: Bench, stiffness_n_per_m: float, law: str, rate_hz: float, drop_m: float, seconds: float = 6.0) -> Rest:
-    """Every tick takes exactly its period, so one run decides."""
-    press(bench, drop_m, rate_hz)
-    loaded = parse(config(bench, stiffness_n_per_m, law, rate_hz), "test")
-    driver = loaded.driver(loaded.options, 1.0 / rate_hz)
-    tick = make_tick(loaded, driver.open())
-    tick.start(driver.read())
-    driver.enable()
-    tick.arm()
-    positions_m = []
-    for _ in range(round(seconds * rate_hz)):
-        driver.write(tick.step(driver.read(), 1.0 / rate_hz))
-        positions_m.append(tick.position_m[2])
-    assert tick.fault == 0
-    driver.close()
-    return rest_of(positions_m[-round(0.5 * rate_hz) :])
+class DeviceTime:
+    """A clock that stands still but for the loop's own sleeps, each of which ends on time.
+
+    The device moves by a period with each sample, so that loop and device live in the same time, and how busy this
+    computer is changes nothing.
+    """
+
+    def __init__(self, stop_after: int) -> None:
+        self.now_ns = 0
+        self.ticks = 0
+        self.loop: ControlLoop | None = None
+        self._stop_after = stop_after
+
+    def monotonic_ns(self) -> int:
+        return self.now_ns
+
+    def thread_time_ns(self) -> int:
+        return 0
+
+    def sleep_until(self, deadline_ns: int) -> int:
+        assert deadline_ns > self.now_ns
+        self.now_ns = deadline_ns
+        self.ticks += 1
+        if self.loop is not None and self.ticks > self._stop_after:
+            self.loop.stop_requested = True
+        return deadline_ns
+
+
+def run(
+    bench: Bench,
+    monkeypatch: pytest.MonkeyPatch,
+    stiffness_n_per_m: float,
+    law: str,
+    rate_hz: float,
+    drop_m: float,
+    seconds: float = 6.0,
+    axis: str = "z",
+) -> Rest:
+    """The daemon's own loop, from arming to the end of its ramp."""
+    press(bench, drop_m, rate_hz, axis)
+    loaded = parse(config(bench, stiffness_n_per_m, law, rate_hz, axis), "test")
+    loop = loaded.config.loop
+    driver = loaded.driver(loaded.options, loop.period_s)
+    info = driver.open()
+    ticks = round(seconds * rate_hz)
+    clock = DeviceTime(ticks)
+    monkeypatch.setattr("hapticd.control.loop.time", clock)
+    shared = SharedMemory(RecordLayout(3, info.has_orientation, MAX_WALLS), rate_hz)
+    tick = make_tick(loaded, info)
+    control = clock.loop = ControlLoop(driver, tick, shared, loop, loaded.config.safety, True, clock.sleep_until)
+    control.run()
+    told = [event.code for event in EventReader(shared).read()]
+    records = RecordReader(shared).read(ticks)
+    shared.close()
+    assert told == [EventCode.STARTED, EventCode.ARMED]
+    assert (len(records), records[-1].skipped, clock.ticks > ticks) == (ticks, 0, True)
+    assert {round(record.dt_s * rate_hz, 6) for record in records[1:]} == {1.0}
+    return rest_of([record.position_m[AXES.index(axis)] for record in records[-round(0.5 * rate_hz) :]])
 
 
 @pytest.mark.parametrize("stiffness_n_per_m", [12000.0, 18000.0, 20000.0])
 @pytest.mark.parametrize(("rate_hz", "device_type"), [(1000.0, RIGHT), (1000.0, LEFT), (4000.0, RIGHT)])
 @pytest.mark.parametrize("drop_m", [0.0, 0.003, 0.01])
 def test_energy_cycle_holds_the_papers_walls(
-    bench: Bench, stiffness_n_per_m: float, rate_hz: float, drop_m: float, device_type: int
+    bench: Bench,
+    monkeypatch: pytest.MonkeyPatch,
+    stiffness_n_per_m: float,
+    rate_hz: float,
+    drop_m: float,
+    device_type: int,
 ) -> None:
     bench.set(type=device_type)
-    rest = run(bench, stiffness_n_per_m, "energy-cycle", rate_hz, drop_m, 6000 / rate_hz)
+    rest = run(bench, monkeypatch, stiffness_n_per_m, "energy-cycle", rate_hz, drop_m, 6000 / rate_hz)
     assert rest.held(stiffness_n_per_m), rest
 
 
-def test_without_a_law_the_same_wall_oscillates(bench: Bench) -> None:
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_the_wall_stands_on_whichever_axis_the_configuration_picks(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, axis: str
+) -> None:
+    rest = run(bench, monkeypatch, 20000.0, "energy-cycle", 1000.0, 0.003, axis=axis)
+    assert rest.held(20000.0), rest
+
+
+def test_without_a_law_the_same_wall_oscillates(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that holding it means something."""
-    assert run(bench, 12000.0, "none", 1000.0, 0.003).peak_to_peak_m > 5e-4
+    assert run(bench, monkeypatch, 12000.0, "none", 1000.0, 0.003).peak_to_peak_m > 5e-4
 
 
 @pytest.mark.parametrize("period_us", [250.0, 1000.0])

@@ -20,6 +20,8 @@ int drdOpenID(char ID) {
     struct device *d = &bench->device[(int)ID];
     if (held_by_another(d))
         return fail(IN_USE);
+    if (d->refuses)
+        return fail((int)d->refuses);
     if (!d->calibrated)
         d->mode = RESET;
     d->holder = getpid();

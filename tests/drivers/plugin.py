@@ -1,0 +1,28 @@
+"""A driver of somebody's own, installed for a test as an entry point that child processes see."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+
+def install(directory: Path, monkeypatch: pytest.MonkeyPatch, *methods: str, name: str = "odd") -> None:
+    """Install a driver with these class methods, each in one line: `find(cls, options=None): return []`."""
+    module = f"{name}_driver"
+    information = directory / f"{name}-1.dist-info"
+    information.mkdir(parents=True)
+    (information / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1\n")
+    (information / "entry_points.txt").write_text(f"[hapticd.drivers]\n{name} = {module}:Driver\n")
+    lines = [
+        "import ctypes, os, time",
+        "from hapticd.contracts.diagnosis import Diagnosis",
+        "from hapticd.contracts.driver import FoundDevice",
+        "from hapticd.contracts.errors import DriverError",
+        "from hapticd_drivers.loopback import Loopback",
+        "class Driver(Loopback):",
+        "    '''Somebody's own.'''",
+        *(line for method in methods for line in ("    @classmethod", f"    def {method}")),
+    ]
+    (directory / f"{module}.py").write_text("\n".join(lines) + "\n")
+    monkeypatch.setenv("PYTHONPATH", str(directory))
