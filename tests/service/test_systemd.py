@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -175,6 +176,20 @@ def test_the_status_text_shows_rate_and_law(service: Service) -> None:
     assert "Hz, law energy-cycle" in service.machine.run("hapticd", "service", "status").stdout
 
 
+def test_the_journal_has_events_by_their_code(service: Service) -> None:
+    def entries() -> list[dict[str, str]]:
+        asked = service.machine.run(
+            *("journalctl", "--unit=hapticd.service", f"HAPTICD_CODE={EventCode.ARMED:d}", "--output=json")
+        )
+        return [json.loads(line) for line in asked.stdout.splitlines()]
+
+    eventually(lambda: bool(entries()), "the arming in the journal", service.machine)
+    last = entries()[-1]
+    assert last["MESSAGE"] == "armed: forces are let through"
+    assert (last["HAPTICD_LAW"], last["HAPTICD_INSTANCE"], last["PRIORITY"]) == ("energy-cycle", "default", "6")
+    assert int(last["HAPTICD_TICK"]) >= 0
+
+
 def test_the_group_reaches_the_sockets_and_nobody_else_does(service: Service) -> None:
     machine = service.machine
     machine.run("useradd", "--groups", "hapticd", "member")
@@ -188,6 +203,31 @@ def test_the_group_reaches_the_sockets_and_nobody_else_does(service: Service) ->
     assert refused.returncode == 1
     with Subscriber(service.endpoint, "hapticd/status") as subscriber:
         assert not subscriber.until("hapticd/status")["armed"]
+
+
+def test_its_keys_are_read_by_the_service_and_let_a_listed_user_command_it(machine: Machine) -> None:
+    machine.run("hapticd", "keys", "make")
+    machine.run("env", "--chdir=/run", "hapticd", "keys", "make", "laptop")
+    keys = machine.path("/etc/hapticd/keys")
+    group = int(machine.run("id", "--group", "hapticd").stdout)
+    found = {path.name: path.stat() for path in (keys, *keys.rglob("*"))}
+    assert {name: (place.st_mode & 0o777, place.st_uid, place.st_gid) for name, place in found.items()} == {
+        "keys": (0o750, 0, group),
+        "clients": (0o750, 0, group),
+        "server.key_secret": (0o640, 0, group),
+        "laptop.key": (0o640, 0, group),
+    }
+    config = PRESSED + '[control]\ntcp = "tcp://127.0.0.1:9873"\n'
+    with Service(machine, config=config) as service, Subscriber(service.endpoint, "hapticd/status") as subscriber:
+        command = ("hapticd", "disarm", "--connect", "tcp://127.0.0.1:9873", "--keys", "/run/laptop.key_secret")
+        machine.run(*command)
+        assert subscriber.until("hapticd/status", armed=False)
+        machine.run("hapticd", "keys", "remove", "laptop")
+        machine.run("systemctl", "reload", "hapticd")
+        refused = machine.run(*command, check=False)
+        assert refused.returncode == 1
+        assert "does not let your key in" in refused.stderr
+    machine.run("rm", "-r", "/etc/hapticd/keys", "/run/laptop.key_secret")
 
 
 def test_a_reload_switches_the_law_without_a_missed_tick_or_a_restart(service: Service) -> None:
