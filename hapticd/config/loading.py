@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from hapticd import registry
+from hapticd.config.file import read
 from hapticd.config.models import Config, ControllerConfig, DeviceConfig
 from hapticd.config.problems import Problems, nearest
 from hapticd.contracts.driver import Driver, DriverOptions
@@ -22,7 +23,6 @@ from hapticd.contracts.table import Table
 PluginT = TypeVar("PluginT")
 TableT = TypeVar("TableT", bound=Table)
 
-_LARGEST_FILE = 1 << 20
 _MAKE_IMPORTABLE = (
     "; install its package where hapticd is installed, or put its directory on PYTHONPATH"
     " (the configuration's directory is not searched)"
@@ -68,26 +68,7 @@ def load(path: Path | str) -> LoadedConfig:
     Raises:
         ConfigError: it cannot be read or used; carries every problem, one line each.
     """
-    try:
-        with Path(path).open("rb") as file:
-            raw = file.read(_LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise ConfigError(f"{path}: is a directory, not a file") from None
-    except PermissionError:
-        raise ConfigError(f"{path}: this user may not read it") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise ConfigError(f"{path}: cannot be read: {reason}") from None
-    if len(raw) > _LARGEST_FILE:
-        raise ConfigError(f"{path}: is larger than 1 MiB, so it is no configuration")
-    try:
-        text = raw.decode()
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise ConfigError(f"{path}: line {line}: not UTF-8 text, save the file as UTF-8") from None
-    return parse(text, str(path))
+    return parse(read(path), str(path))
 
 
 def parse(text: str, name: str) -> LoadedConfig:
@@ -107,6 +88,11 @@ def parse(text: str, name: str) -> LoadedConfig:
     law, params = _law(problems, data)
     if config is not None:
         _check_together(problems, config)
+        if options is not None:
+            try:
+                options.check_at(config.loop.period_s)
+            except ValueError as error:
+                problems.add(("device", "options"), str(error))
     if problems.lines or config is None or driver is None or options is None or law is None or params is None:
         raise ConfigError(*problems.lines)
     return LoadedConfig(config, driver, options, law, params, Path(name), text)

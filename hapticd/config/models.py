@@ -20,6 +20,9 @@ MAX_WALLS = 8
 
 Axis = Literal["x", "y", "z"]
 
+MAX_CHANGES = 50
+"""Most changes of a wall over time: a running loop takes a wall over in the time between two ticks."""
+
 
 class LoopConfig(Table):
     """[loop]: how fast the control loop runs and how hard it insists on real time."""
@@ -86,7 +89,9 @@ class WallConfig(Table):
     damping_n_s_per_m: float = Field(
         0.0, ge=-1e6, le=1e6, description="damping of the wall itself [N s/m]; negative makes the wall active"
     )
-    changes: tuple[WallChange, ...] = Field((), description="changes of stiffness or damping over time")
+    changes: tuple[WallChange, ...] = Field(
+        (), max_length=MAX_CHANGES, description="changes of stiffness or damping over time, at most fifty"
+    )
 
     @field_validator("changes")
     @classmethod
@@ -165,7 +170,9 @@ class TelemetryConfig(Table):
 
     ipc: bool = Field(True, description="publish on the instance's ipc endpoint")
     tcp: str | None = Field(
-        None, description="extra TCP endpoint on this host, for example tcp://127.0.0.1:9872; unset: none"
+        None,
+        description="extra TCP endpoint, such as tcp://127.0.0.1:9872; unset: none; off this host, such as "
+        "tcp://0.0.0.0:9872, for `hapticd keys` only",
     )
     batch_ticks: int = Field(20, ge=1, le=1000, description="most ticks in one message; 20 ms at the longest")
     every_ticks: int = Field(1, ge=1, le=10000, description="publish one tick in this many; cycles and events always")
@@ -175,19 +182,29 @@ class TelemetryConfig(Table):
 
     @field_validator("tcp")
     @classmethod
-    def _stays_on_this_host(cls, endpoint: str | None) -> str | None:
-        if endpoint is None:
-            return None
-        found = re.fullmatch(r"tcp://(?:\[([0-9a-f:]+)\]|([0-9.]+)):([0-9]{1,5})", endpoint, re.IGNORECASE | re.ASCII)
-        try:
-            address = ipaddress.ip_address(found[1] or found[2]) if found else None
-        except ValueError:
-            address = None
-        if found is None or address is None or not 1 <= int(found[3]) <= 65535:
-            raise ValueError("must be an address and a port, such as tcp://127.0.0.1:9872")
-        if not address.is_loopback:
-            raise ValueError("must stay on this host, such as tcp://127.0.0.1:9872: measurements are not encrypted")
-        return endpoint
+    def _is_endpoint(cls, endpoint: str | None) -> str | None:
+        return _tcp_endpoint(endpoint, 9872)
+
+
+class ControlConfig(Table):
+    """[control]: where commands are taken besides the instance's own socket."""
+
+    tcp: str | None = Field(
+        None, description="TCP endpoint for `hapticd keys` only, such as tcp://0.0.0.0:9873; unset: none"
+    )
+
+    @field_validator("tcp")
+    @classmethod
+    def _is_endpoint(cls, endpoint: str | None) -> str | None:
+        return _tcp_endpoint(endpoint, 9873)
+
+
+class ServiceConfig(Table):
+    """[service]: how the daemon deals with this file."""
+
+    reload_on_save: bool = Field(
+        False, description="take the file over whenever it is saved, as `hapticd reload` does when asked"
+    )
 
 
 class FaultsConfig(Table):
@@ -206,4 +223,19 @@ class Config(Table):
     controller: ControllerConfig = Field(default_factory=ControllerConfig)
     safety: SafetyConfig = Field(default_factory=SafetyConfig)
     telemetry: TelemetryConfig = Field(default_factory=TelemetryConfig)
+    control: ControlConfig = Field(default_factory=ControlConfig)
     faults: FaultsConfig = Field(default_factory=FaultsConfig)
+    service: ServiceConfig = Field(default_factory=ServiceConfig)
+
+
+def _tcp_endpoint(endpoint: str | None, port: int) -> str | None:
+    if endpoint is None:
+        return None
+    found = re.fullmatch(r"tcp://(?:\[([0-9a-f:]+)\]|([0-9.]+)):([0-9]{1,5})", endpoint, re.IGNORECASE | re.ASCII)
+    try:
+        address = ipaddress.ip_address(found[1] or found[2]) if found else None
+    except ValueError:
+        address = None
+    if found is None or address is None or not 1 <= int(found[3]) <= 65535:
+        raise ValueError(f"must be an address and a port, such as tcp://127.0.0.1:{port}")
+    return endpoint

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from hapticd.contracts.driver import DriverOptions
 from hapticd.simulation.presets import PRESETS
 
-MAX_DELAY_SAMPLES = 64
+MAX_DELAY_SAMPLES = 128
 _FORCE = 1e6  # [N], far beyond any hand: a bound only against slips of the pen
 
 
@@ -138,7 +138,9 @@ class Change(DriverOptions):
     at_s: Seconds = Field(description="device time of the first period with the new values [s]")
     mass_kg: float | None = Field(None, ge=1e-9, le=1e6, description="new mass [kg]")
     viscous_n_s_per_m: float | None = Field(None, ge=-1e6, le=1e9, description="new viscous friction [N s/m]")
-    coulomb_n: float | None = Field(None, ge=0.0, le=_FORCE, description="new Coulomb friction [N]")
+    coulomb_n: Annotated[float, _zero_or_at_least(1e-12)] | None = Field(
+        None, ge=0.0, le=_FORCE, description="new Coulomb friction [N]"
+    )
     max_force_n: float | None = Field(None, ge=0.0, le=_FORCE, description="new saturation, 0 = none [N]")
     hand_mass_kg: float | None = Field(None, ge=0.0, le=1e6, description="new mass of the hand [kg]")
     hand_damping_n_s_per_m: float | None = Field(None, ge=0.0, le=1e6, description="new damping of the hand [N s/m]")
@@ -159,6 +161,20 @@ class Change(DriverOptions):
         }
 
 
+class Accuracy(DriverOptions):
+    """accuracy: largest errors against the full model, exactly stepped, over the first seconds of the configuration."""
+
+    position_m: float | None = Field(None, gt=0.0, le=1.0, description="of the true position at any tick [m]")
+    energy_j: float | None = Field(None, gt=0.0, le=1e6, description="of the energy into the walls at any tick [J]")
+    over_s: float = Field(2.0, ge=0.1, le=10.0, description="from the first tick, as long as this [s]")
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> Accuracy:
+        if self.position_m is None and self.energy_j is None:
+            raise ValueError("name position_m, energy_j or both")
+        return self
+
+
 class SimulationOptions(DriverOptions):
     """[device.options] of a simulated device. `model` fills the keys that the file does not set."""
 
@@ -170,7 +186,9 @@ class SimulationOptions(DriverOptions):
     viscous_n_s_per_m: float = Field(
         4.4, ge=-1e6, le=1e9, description="viscous friction; negative makes the device active [N s/m]"
     )
-    coulomb_n: float = Field(0.0, ge=0.0, le=_FORCE, description="Coulomb friction, the same at rest and sliding [N]")
+    coulomb_n: Annotated[float, _zero_or_at_least(1e-12)] = Field(
+        0.0, ge=0.0, le=_FORCE, description="Coulomb friction, the same at rest and sliding [N]"
+    )
     resolution_m: Annotated[float, _zero_or_at_least(1e-12)] = Field(
         1e-5, ge=0.0, le=1.0, description="step of the measured position, 0 = continuous [m]"
     )
@@ -195,8 +213,21 @@ class SimulationOptions(DriverOptions):
         "ticks",
         description="ticks: one period per read, whatever the host does; wall: periods that really elapsed",
     )
+    integrator: Literal["exact", "explicit-euler", "semi-implicit-euler", "velocity-verlet", "rk4"] = Field(
+        "exact", description="how the device moves between samples; exact is the closed form, see docs/accuracy.md"
+    )
+    substeps: int = Field(1, ge=1, le=1000, description="steps of the integrator a period; exact takes one")
+    accuracy: Accuracy | None = Field(
+        None, description="take the cheapest integrator and terms that err by no more than this"
+    )
     hand: Hand = Field(default_factory=Hand, description="who holds the device")
     changes: tuple[Change, ...] = Field((), description="new values from some time on")
+
+    def check_at(self, period_s: float) -> None:
+        """Refuse what a step of this length cannot hold."""
+        from hapticd.simulation.plant import epochs  # is built on these options
+
+        epochs(self, period_s)
 
     @model_validator(mode="before")
     @classmethod
@@ -212,6 +243,14 @@ class SimulationOptions(DriverOptions):
         times = [change.at_s for change in self.changes]
         if any(later <= earlier for earlier, later in itertools.pairwise(times)):
             raise ValueError("changes must be in order of at_s, each later than the one before")
+        return self
+
+    @model_validator(mode="after")
+    def _integrator_fits(self) -> SimulationOptions:
+        if self.integrator == "exact" and self.substeps != 1:
+            raise ValueError("substeps must be 1 with the exact integrator, which needs no more")
+        if self.accuracy is not None and (self.integrator != "exact" or self.clock != "ticks"):
+            raise ValueError('accuracy chooses the integrator itself, and needs clock = "ticks"')
         return self
 
 

@@ -384,13 +384,13 @@ anything = st.fixed_dictionaries(
     optional={
         "mass_kg": st.floats(1e-9, 1e6),
         "viscous_n_s_per_m": st.floats(0.0, 1e9),
-        "coulomb_n": st.floats(0.0, 1e6),
+        "coulomb_n": st.just(0.0) | st.floats(1e-12, 1e6),
         "resolution_m": st.just(0.0) | st.floats(1e-12, 1.0),
         "noise_m": st.floats(0.0, 1.0),
         "seed": st.integers(0, 2**53),
         "max_force_n": st.floats(0.0, 1e6),
         "bandwidth_hz": st.just(0.0) | st.floats(1e-3, 1e9),
-        "force_delay_samples": st.integers(0, 64),
+        "force_delay_samples": st.integers(0, 128),
         "initial_position_m": st.floats(-1e3, 1e3),
         "initial_velocity_m_per_s": st.floats(-1e3, 1e3),
         "hand": st.fixed_dictionaries(

@@ -179,7 +179,7 @@ def test_an_interrupted_map_goes_on_to_the_same_files(tmp_path: Path, monkeypatc
 
     with monkeypatch.context() as patched:
         patched.setattr(sweep, "_block", interrupted)
-        patched.setattr(job, "code_digest", lambda work, laws: "the same")
+        patched.setattr(job, "code_digest", lambda laws: "the same")
         assert zwidth(*SMALL, "--output", str(tmp_path / "broken")) == 130
     assert not (tmp_path / "broken" / "zwidth.csv").exists()
 
@@ -188,7 +188,7 @@ def test_an_interrupted_map_goes_on_to_the_same_files(tmp_path: Path, monkeypatc
         return original(spec, block, threads)
 
     monkeypatch.setattr(sweep, "_block", counted)
-    monkeypatch.setattr(job, "code_digest", lambda work, laws: "the same")
+    monkeypatch.setattr(job, "code_digest", lambda laws: "the same")
     assert zwidth(*SMALL, "--output", str(tmp_path / "broken")) == 0
     assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
     assert sorted(path.name for path in (tmp_path / "broken").iterdir()) == sorted(FILES)

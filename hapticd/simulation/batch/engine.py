@@ -86,6 +86,10 @@ class Batch:
         """
         arrays = self.arrays()
         self.run_on(arrays, workers, progress)
+        return self.result(arrays)
+
+    def result(self, arrays: Arrays) -> BatchResult:
+        """What became of the points, from the arrays that they were run on."""
         return result_of(self._prepared, arrays)
 
     def arrays(self) -> Arrays:
@@ -93,7 +97,7 @@ class Batch:
         return arrays_of(self._prepared, self._rows)
 
     def run_on(self, arrays: Arrays, workers: int | None = None, progress: Callable[[int], None] | None = None) -> None:
-        """Run every point as machine code, from and into these arrays."""
+        """Run every point as machine code, from and into these arrays; called again, it goes on where it was."""
         sweep = machine_code(self.law, tuple(sorted(self._switches.items())))
         count = len(self._prepared)
         step = max(CHUNK, -(-count // 50)) if progress else count

@@ -26,14 +26,16 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
 
     @njit(**OPTIONS)  # type: ignore[untyped-decorator]
     def one(at: Any, arrays: Any) -> None:
+        plant = on_stack(arrays.plants[at])
         state = on_stack(arrays.loops[at])
+        tick = on_stack(arrays.ticks[at])
         law_state = on_stack(arrays.law_states[at])
         ledger = on_stack(arrays.ledgers[at])
         line = slice(arrays.line_from[at], arrays.line_from[at + 1])
         points = slice(arrays.points_from[at], arrays.points_from[at + 1])
         past = slice(arrays.history_from[at], arrays.history_from[at + 1])
         loop(
-            on_stack(arrays.plants[at]),
+            plant,
             arrays.epochs,
             Buffers(arrays.lines[line], arrays.points_s[points], arrays.points_n[points]),
             LoopBuffers(arrays.history_m[past], arrays.history_s[past]),
@@ -42,11 +44,13 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
             arrays.segments,
             law_state,
             on_stack(arrays.law_params[at]),
-            on_stack(arrays.ticks[at]),
+            tick,
             ledger,
             arrays.traces[at],
         )
+        arrays.plants[at] = plant
         arrays.loops[at] = state
+        arrays.ticks[at] = tick
         arrays.law_states[at] = law_state
         arrays.ledgers[at] = ledger
 

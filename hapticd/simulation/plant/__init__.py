@@ -13,8 +13,10 @@ from hapticd.simulation.plant.hand import recorded_points
 from hapticd.simulation.plant.hold import flow
 from hapticd.simulation.plant.state import Buffers, PlantParams, PlantState
 from hapticd.simulation.plant.step import move, sense
+from hapticd.simulation.plant.stepped import METHODS
 
 __all__ = [
+    "METHODS",
     "Buffers",
     "PlantParams",
     "PlantState",

@@ -7,8 +7,17 @@ import math
 from hapticd.simulation.options import Change, SimulationOptions
 from hapticd.simulation.plant.hand import hand_fields, hand_terms
 from hapticd.simulation.plant.hold import flow
+from hapticd.simulation.plant.stepped import METHODS
 
 _SWINGS_PER_PERIOD = 10.0
+
+MOST_GROWTH = 100.0
+"""An active device may grow e^100-fold in a period: what a step makes of it is still a number."""
+
+MOST_TURNS = 1e5
+"""The spring of the hand may swing so many times in a period: 1e-16 of an angle each time, and the phase is known."""
+
+LONGEST_PERIOD_S = 1e6
 
 
 def start_state(options: SimulationOptions) -> dict[str, float | int]:
@@ -32,7 +41,7 @@ def epochs(options: SimulationOptions, period_s: float) -> list[tuple[int, dict[
     """The parameters from each change on, as (first tick, fields of `PlantParams`); the first is tick 0.
 
     Raises:
-        ValueError: with Coulomb friction, the spring of the hand swings too fast for the rate.
+        ValueError: the device grows or swings too fast for the rate; names the parameter and its limit.
     """
     values = {
         "mass_kg": options.mass_kg,
@@ -65,6 +74,11 @@ def terms(options: SimulationOptions) -> dict[str, bool]:
         "FRICTION": options.coulomb_n > 0.0 or any(change.coulomb_n for change in options.changes),
         "NOISE": options.noise_m > 0.0,
         "QUANTISED": options.resolution_m > 0.0,
+        "STEPPED": options.integrator != "exact",
+        "EXPLICIT": options.integrator == "explicit-euler",
+        "SEMI_IMPLICIT": options.integrator == "semi-implicit-euler",
+        "VERLET": options.integrator == "velocity-verlet",
+        "RK4": options.integrator == "rk4",
         **hand_terms(options),
     }
 
@@ -79,6 +93,7 @@ def _params(options: SimulationOptions, values: dict[str, float], period_s: floa
     decay_per_s = (values["viscous_n_s_per_m"] + values["hand_damping_n_s_per_m"]) / mass_kg
     spring_n_per_m = values["hand_stiffness_n_per_m"]
     stiffness_per_s2 = spring_n_per_m / mass_kg
+    _refuse_beyond_doubles(values, mass_kg, period_s)
     v_per_v, v_per_a, x_per_a = flow(decay_per_s, stiffness_per_s2, period_s)
     swing_per_s2 = stiffness_per_s2 - 0.25 * decay_per_s * decay_per_s
     half_swing_s = math.pi / math.sqrt(swing_per_s2) if swing_per_s2 > 0.0 else math.inf
@@ -108,7 +123,32 @@ def _params(options: SimulationOptions, values: dict[str, float], period_s: floa
         "lag_keep": lag_keep,
         "lag_mean": lag_mean,
         "delay_samples": options.force_delay_samples,
+        "method": METHODS.index(options.integrator),
+        "substeps": options.substeps,
+        "substep_s": period_s / options.substeps,
         "resolution_m": options.resolution_m,
         "noise_m": options.noise_m * math.sqrt(3.0),
         **hand_fields(options),
     }
+
+
+def _refuse_beyond_doubles(values: dict[str, float], mass_kg: float, period_s: float) -> None:
+    """Say which parameter leads to a step that double precision cannot hold."""
+    if not 0.0 < period_s <= LONGEST_PERIOD_S:
+        raise ValueError(f"period_s = {period_s:g}: must be more than 0 and at most {LONGEST_PERIOD_S:g} s")
+    viscous = values["viscous_n_s_per_m"] + values["hand_damping_n_s_per_m"]
+    grows = -viscous / mass_kg * period_s
+    if grows > MOST_GROWTH:
+        least = -MOST_GROWTH * mass_kg / period_s - values["hand_damping_n_s_per_m"]
+        raise ValueError(
+            f"viscous_n_s_per_m = {values['viscous_n_s_per_m']:g}: {mass_kg:g} kg would speed up e^{grows:.3g}-fold in "
+            f"a period of {period_s:g} s; must be {least:g} or more"
+        )
+    spring_n_per_m = values["hand_stiffness_n_per_m"]
+    turns = math.sqrt(spring_n_per_m / mass_kg) * period_s / (2.0 * math.pi)
+    if turns > MOST_TURNS:
+        most = (2.0 * math.pi * MOST_TURNS / period_s) ** 2 * mass_kg
+        raise ValueError(
+            f"hand.stiffness_n_per_m = {spring_n_per_m:g}: {mass_kg:g} kg would swing {turns:.3g} times in a period "
+            f"of {period_s:g} s; must be at most {most:g}"
+        )

@@ -61,6 +61,9 @@ class PlantParams:
         lag_keep: share of its distance from the command that the actuator keeps over a period.
         lag_mean: mean of that share over the period.
         delay_samples: periods between command and force.
+        method: integrator, one of the `METHOD_` numbers.
+        substeps: steps of it a period.
+        substep_s: time of one [s].
         resolution_m: step of the sensor [m].
         noise_m: standard deviation of the sensor noise, times sqrt(3) [m].
         hand_profile: which function of time the hand follows, one of the `PROFILE_` numbers.
@@ -84,11 +87,14 @@ class PlantParams:
         "lag_mean",
         "limit_n",
         "mass_kg",
+        "method",
         "noise_m",
         "period_s",
         "resolution_m",
         "spring_n_per_m",
         "stiffness_per_s2",
+        "substep_s",
+        "substeps",
         "v_per_f",
         "v_per_v",
         "x_per_f",
@@ -110,6 +116,9 @@ class PlantParams:
     lag_keep: float
     lag_mean: float
     delay_samples: int
+    method: int
+    substeps: int
+    substep_s: float
     resolution_m: float
     noise_m: float
     hand_profile: int

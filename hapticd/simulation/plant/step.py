@@ -11,6 +11,7 @@ from hapticd.simulation.plant.arithmetic import ROUND
 from hapticd.simulation.plant.hand import hand_force
 from hapticd.simulation.plant.hold import flow
 from hapticd.simulation.plant.state import Buffers, PlantParams, PlantState
+from hapticd.simulation.plant.stepped import METHOD_EXACT, stepped
 
 # Terms of the model. All on is the full model; `coefficients.terms` says which ones a device needs.
 DELAY: bool = True
@@ -21,6 +22,7 @@ SPRING: bool = True
 FRICTION: bool = True
 NOISE: bool = True
 QUANTISED: bool = True
+STEPPED: bool = True
 TIMED: bool = True
 
 
@@ -45,7 +47,9 @@ def move(state: PlantState, params: PlantParams, buffers: Buffers, force_n: floa
     state.applied_n = f
     if HAND:
         f = f + hand_force(state, params, buffers)
-    if FRICTION:
+    if STEPPED and params.method != METHOD_EXACT:
+        stepped(state, params, f)
+    elif FRICTION:
         slide(state, params, f)
     else:
         if SPRING:

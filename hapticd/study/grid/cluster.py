@@ -45,7 +45,7 @@ def blocks(address: str, job: Job, wanted: Sequence[int]) -> Iterator[tuple[int,
             raise ConfigError(
                 f"--cluster {address}: the scheduler has no workers; start some: dask worker {address}"
             ) from None
-        digest = code_digest(job.work, job.laws)
+        digest = code_digest(job.laws)
         futures = {
             client.submit(_block, job.work, job.spec, block, job.laws, digest, pure=False): block for block in wanted
         }
@@ -71,7 +71,7 @@ def blocks(address: str, job: Job, wanted: Sequence[int]) -> Iterator[tuple[int,
 def _block(work: Work, spec: object, block: int, laws: tuple[str, ...], digest: str) -> list[Row]:
     """One block on a worker; the engine has threads of its own, so only one block at a time in a process."""
     worker = _dask.get_worker()
-    if code_digest(work, laws) != digest:
+    if code_digest(laws) != digest:
         raise HapticdError(
             f"worker {worker.address} has another hapticd or another law of that name: install the same everywhere"
         )

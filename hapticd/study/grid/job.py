@@ -60,7 +60,7 @@ def kept(job: Job, path: Path, fresh: bool = False) -> Iterator[Journal]:
         fresh: forget what was done before.
     """
     spec = json.dumps(job.spec, sort_keys=True)
-    journal = Journal(path, hashlib.sha256((code_digest(job.work, job.laws) + spec).encode()).hexdigest(), fresh)
+    journal = Journal(path, hashlib.sha256((code_digest(job.laws) + spec).encode()).hexdigest(), fresh)
     try:
         yield journal
         journal.remove()
@@ -117,12 +117,10 @@ def in_order(sizes: Sequence[int], blocks: Sequence[list[Row]]) -> list[Row]:
 
 
 @lru_cache(maxsize=8)
-def code_digest(work: Work, laws: tuple[str, ...]) -> str:
-    """A hash of every source that decides about the results."""
+def code_digest(laws: tuple[str, ...]) -> str:
+    """A hash of every source that may decide about the results: all of hapticd's, and the laws'."""
     package = Path(hapticd.__file__).parent
-    files = {*(package / "simulation").glob("*.py"), *(package / "contracts").glob("*.py"), package / "energy.py"}
-    files |= set(Path(inspect.getfile(work)).parent.glob("*.py")) | {package / "study" / "verdict.py"}
-    found = [(file.name, file.read_bytes()) for file in sorted(files)]
+    found = [(str(file.relative_to(package)), file.read_bytes()) for file in sorted(package.rglob("*.py"))]
     found += [(law, Path(inspect.getfile(registry.law(law))).read_bytes()) for law in sorted(laws)]
     digest = hashlib.sha256(hapticd.__version__.encode())
     for name, source in found:

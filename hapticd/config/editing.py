@@ -1,0 +1,132 @@
+"""Put another law into the text of a configuration; all else stays as its author wrote it, comments included."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+import tomlkit
+from tomlkit.container import Container
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import Comment, InlineTable, Null, Table, Whitespace
+
+from hapticd.config.loading import parse
+from hapticd.config.models import ControllerConfig
+from hapticd.contracts.errors import ConfigError
+
+_BOM = "\ufeff"
+
+
+def with_law(text: str, name: str, law: str, params: dict[str, Any]) -> str:
+    """The text with another law, or other parameters of the same one.
+
+    Parameters belong to a law: those of the law before leave with it. Where they stood in a table of their own they
+    stay behind as one line of comment, one a law.
+
+    Args:
+        text: TOML.
+        name: what to call it in errors, usually its path.
+        law: name of the law.
+        params: parameters to set; others of the same law stay as they are.
+
+    Returns:
+        A text that `parse` takes.
+
+    Raises:
+        ConfigError: the old text is no TOML, the new one would be no configuration, or only a person can edit it.
+    """
+    mark = _BOM if text.startswith(_BOM) else ""
+    text = text.removeprefix(_BOM)
+    try:
+        data = tomllib.loads(f"{text}\n")  # as `parse` reads it
+    except (ValueError, RecursionError):
+        parse(text, name)  # says where
+        raise
+    controller = data.setdefault("controller", {})
+    old = controller.get("params", {}) if isinstance(controller, dict) else None
+    if not isinstance(old, dict):
+        parse(text, name)
+        raise ConfigError(f"{name}: controller: must be a table")
+    was = controller.get("law", ControllerConfig().law)
+    left = {} if law == was else old
+    controller |= {"law": law, "params": {**({} if left else old), **params}}
+
+    try:
+        edited = _edited(text, law, params, f"{was}: " if left else "")
+        found = tomllib.loads(edited)
+    except (TOMLKitError, ValueError):
+        raise _by_hand(name) from None
+    parse(edited, name)
+    found["controller"].setdefault("params", {})
+    if found != data:
+        raise _by_hand(name)
+    return mark + edited
+
+
+def _by_hand(name: str) -> ConfigError:
+    return ConfigError(f"{name}: [controller] is written in a way that only a person can edit")
+
+
+def _edited(text: str, law: str, params: dict[str, Any], leaving: str) -> str:
+    document = tomlkit.parse(text)
+    if "controller" not in document:
+        start = f"{text.rstrip()}\n\n" if text.strip() else ""
+        table = "".join(f"{line}\n" for line in ["", "[controller.params]", *map(_line, params.items())] if params)
+        return f"{start}[controller]\n{_line(('law', law))}\n{table}"
+    controller: Any = document["controller"]
+    controller["law"] = law
+    if "params" not in controller:
+        if not params:
+            return tomlkit.dumps(document)
+        if isinstance(controller, InlineTable):
+            controller["params"] = tomlkit.inline_table()
+        else:
+            controller["params"] = tomlkit.table()
+            controller["params"].add(tomlkit.nl())
+    table = controller["params"]
+    if leaving:
+        values = ", ".join(_line((key, value)) for key, value in table.unwrap().items())
+        for key in list(table):
+            del table[key]
+        if isinstance(table, Table) and not table.is_super_table():
+            _note(table, leaving, values)
+    for key in [key for key in params if key in table]:
+        table[key] = params[key]
+    tail = _cut_tail(table.value) if isinstance(table, Table) else []
+    for key, value in params.items():
+        table[key] = value
+    for item in tail:
+        table.add(item)
+    edited = tomlkit.dumps(document)
+    return edited if text.endswith("\n\n") else f"{edited.rstrip()}\n"
+
+
+def _line(pair: tuple[str, Any]) -> str:
+    key, value = pair
+    return f"{tomlkit.key(key).as_string()} = {tomlkit.item(value).as_string()}"
+
+
+def _note(table: Table, law: str, values: str) -> None:
+    """Leave one line of comment behind, in the place of an earlier one of the same law."""
+    body = table.value.body
+    for index, (key, item) in enumerate(body):
+        if key is None and isinstance(item, Comment) and item.as_string().lstrip().startswith(f"# {law}"):
+            body[index] = (None, Null())
+    tail = _cut_tail(table.value)
+    table.add(tomlkit.comment(f"{law}{values}"))
+    for item in tail:
+        table.add(item)
+
+
+def _cut_tail(container: Container) -> list[Any]:
+    """Take off what follows the last key: it may be a comment that heads the next table.
+
+    A table without keys ends where the first blank line is.
+    """
+    body = container.body
+    keys = [index for index, (key, item) in enumerate(body) if key is not None or isinstance(item, Null)]
+    blanks = [index for index, (_, item) in enumerate(body) if isinstance(item, Whitespace)]
+    end = keys[-1] + 1 if keys else blanks[0] if blanks else len(body)
+    tail = [item for _, item in body[end:]]
+    del body[end:]
+    return tail

@@ -1,0 +1,78 @@
+"""The configuration as a file: read whole, and replaced whole, so that nobody ever reads half of it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from hapticd.contracts.errors import ConfigError
+
+_LARGEST = 1 << 20
+
+
+def read(path: Path | str) -> str:
+    """Text of a configuration file, line ends as they are.
+
+    Raises:
+        ConfigError: it cannot be read, or is no text.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            raw = file.read(_LARGEST + 1)
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise ConfigError(f"{path}: is a directory, not a file") from None
+    except PermissionError:
+        raise ConfigError(f"{path}: this user may not read it") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise ConfigError(f"{path}: cannot be read: {reason}") from None
+    if len(raw) > _LARGEST:
+        raise ConfigError(f"{path}: is larger than 1 MiB, so it is no configuration")
+    try:
+        return raw.decode()
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise ConfigError(f"{path}: line {line}: not UTF-8 text, save the file as UTF-8") from None
+
+
+def replace(path: Path, text: str) -> None:
+    """Put another text in the place of an existing file, at once; mode, owner and attributes stay.
+
+    A link stays a link: the file that it leads to is replaced.
+
+    Raises:
+        ConfigError: this user may not; the file is as it was.
+    """
+    target = path.resolve()
+    try:
+        if not os.access(target, os.W_OK):
+            raise PermissionError
+        descriptor, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        try:
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(text.encode())
+                file.flush()
+                status = target.stat()
+                os.chown(descriptor, status.st_uid, status.st_gid)
+                shutil.copystat(target, name)
+                os.utime(name)
+                os.fsync(descriptor)
+            Path(name).replace(target)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                Path(name).unlink()
+            raise
+        folder = os.open(target.parent, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except PermissionError:
+        raise ConfigError(f"{path}: this user may not replace it and keep its owner: use sudo") from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}; it is as it was") from None
