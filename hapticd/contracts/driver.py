@@ -25,6 +25,16 @@ from hapticd.contracts.table import Table
 class DriverOptions(Table):
     """Base of every driver's options, the keys of [device.options]: strict, frozen, finite, no unknown keys."""
 
+    def check_at(self, period_s: float) -> None:
+        """Refuse what cannot run at this loop rate; most devices refuse nothing.
+
+        Args:
+            period_s: time between ticks [s].
+
+        Raises:
+            ValueError: a value goes too far; says `key = value: why`.
+        """
+
 
 OptionsT = TypeVar("OptionsT", bound=DriverOptions)
 

@@ -8,12 +8,11 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Generator
-from functools import partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from hapticd import registry
-from hapticd.config.models import SafetyConfig, SceneConfig
+from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
 from hapticd.contracts.driver import DriverState
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import EventCode
@@ -92,9 +91,18 @@ class Letters:
         threading.Thread(target=calibrate, daemon=True).start()
         while not ended:
             yield
-        if ended[0] is not None:
-            raise ended[0]
+        _raise(ended)
+        loop.tick.forget_origin()
         loop.event(EventCode.CALIBRATED, "calibrated")
+
+    def _do_tare(self) -> Generator[None, None, None]:
+        tick = self._loop.tick
+        if not tick.tare():
+            raise HapticdError("tare moves the walls: `hapticd disarm` first, and the device must know where it is")
+        axes = zip(tick.info.axes, tick.origin_m, strict=True)
+        origin_m: dict[str, float | int | str] = {f"origin_{axis}_m": origin for axis, origin in axes}
+        self._loop.event(EventCode.TARED, "tared: positions count from here", **origin_m)
+        yield
 
     def _do_switch(
         self,
@@ -113,12 +121,17 @@ class Letters:
             yield from self._import(law)
         module = self._laws[law]
         yield
-        values = module.Params.model_validate(params)
-        new_scene = SceneConfig.model_validate(scene)
+        pattern = RunningLaw(module, module.Params.model_validate(params))
+        yield
         new_safety = SafetyConfig.model_validate(safety)
         yield
-        make_law = None if keep_law else partial(RunningLaw, module, values)
-        tick.switch(new_scene, new_safety, make_law)
+        walls = []
+        for wall in scene["walls"]:
+            walls.append(WallConfig.model_validate(wall))
+            yield
+        new_scene = SceneConfig.model_validate({**scene, "walls": walls})
+        yield
+        tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
         loop.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
         if not keep_law:
             loop.law_count += 1
@@ -127,21 +140,28 @@ class Letters:
 
     def _import(self, name: str) -> Generator[None, None, None]:
         """Import a law beside the loop; its ticks go on, at worst late by the switch interval."""
-        found: list[ModuleType | Exception] = []
+        ended: list[Exception | None] = []
 
         def load() -> None:
             try:
-                found.append(registry.law(name))
+                self._laws[name] = registry.law(name)
+                ended.append(None)
             except HapticdError as error:
-                found.append(error)
+                ended.append(error)
 
         before_s = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
         threading.Thread(target=load, daemon=True).start()
-        while not found:
+        while not ended:
             yield
         sys.setswitchinterval(before_s)
-        result = found[0]
-        if isinstance(result, Exception):
-            raise result
-        self._laws[name] = result
+        _raise(ended)
+
+
+def _raise(ended: list[Exception | None]) -> None:
+    """Raise what a thread has handed over, if anything.
+
+    Nobody keeps it: an error knows the frames that it went through, and in this process no collector breaks cycles.
+    """
+    if ended[0] is not None:
+        raise cast(Exception, ended.pop())

@@ -10,6 +10,7 @@ from hapticd.config.models import LoopConfig, SafetyConfig
 from hapticd.contracts.driver import Driver, DriverState, Sample
 from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
 from hapticd.contracts.event import Event, EventCode
+from hapticd.contracts.record import Flag
 from hapticd.control.letters import Letters
 from hapticd.control.predecessor import NOBODY, Predecessor
 from hapticd.control.shared import (
@@ -36,6 +37,8 @@ BURST_TICKS = 10
 
 LATE_S = 0.05
 """A real device is released when so much more time was skipped than kept: its last force was held all the while [s]."""
+
+_UNCALIBRATED = int(Flag.UNCALIBRATED)
 
 
 class ControlLoop:
@@ -79,7 +82,12 @@ class ControlLoop:
         self._burst_due_ns = 0
         self._sleep_until = sleep_until
         self._auto_arm = auto_arm
+        layout = shared.layout
         self._area = shared.record_area
+        self._slots = shared.slots
+        self._slot_size = layout.size
+        self._has_orientation = layout.orientation
+        self._packs = [layout.struct(walls).pack_into for walls in range(layout.max_walls + 1)]
         driver.share_metrics(shared.metrics)
         self.letters = Letters(self)
         self.stall_ns = int(safety.supervisor_stall_s * 1e9)
@@ -262,21 +270,19 @@ class ControlLoop:
             stored_j += ledger.stored_j
             dissipated_j += ledger.dissipated_j
             generated_j += ledger.generated_j
-        shared = self.shared
-        layout = shared.layout
-        words = shared.words
+        words = self.shared.words
         written = words[RECORDS]
         count = len(tick.contacts)
-        layout.struct(count).pack_into(
+        self._packs[count](
             self._area,
-            written % shared.slots * layout.size,
+            written % self._slots * self._slot_size,
             self.seq,
             deadline_ns,
             late_us,
             busy_us,
             tick.dt_s,
             skipped,
-            tick.flags,
+            tick.flags if sample.calibrated else tick.flags | _UNCALIBRATED,
             self.law_count,
             sample.buttons,
             sample.gripper_m,
@@ -289,7 +295,7 @@ class ControlLoop:
             *tick.velocity_m_per_s,
             *tick.force_n,
             *tick.requested_n,
-            *(sample.orientation if layout.orientation else ()),
+            *(sample.orientation if self._has_orientation else ()),
             *walls,
         )
         words[RECORDS] = written + 1

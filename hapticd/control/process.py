@@ -16,7 +16,7 @@ import socket
 import sys
 import time
 import traceback
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from types import ModuleType
 from typing import Any
 
@@ -106,6 +106,7 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
     config = parse(request["text"], request["name"])
     before = Predecessor(**request["before"])
     settings = config.config
+    config, accuracy = _fitted(config)
     driver = config.driver(config.options, settings.loop.period_s)
     place_device(config, driver)
     info = driver.open()
@@ -139,12 +140,23 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
         problems, advice = become_realtime(settings.loop)
         shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
         hello = {"info": asdict(info), "realtime": not problems, "warnings": problems + advice, "pid": os.getpid()}
+        hello["accuracy"] = accuracy
         socket.send_fds(channel, [msgpack.packb(hello)], [shared.descriptor])
         channel.close()
     except BaseException:
         driver.close()
         raise
     return control
+
+
+def _fitted(config: LoadedConfig) -> tuple[LoadedConfig, str]:
+    """The configuration with the device model that it asks for, and why that one."""
+    if getattr(config.options, "accuracy", None) is None:
+        return config, ""
+    from hapticd.control.fitting import fit  # only those who ask pay for it, and it needs `make_tick` from here
+
+    found = fit(config)
+    return (config, "") if found is None else (replace(config, options=found.options), found.reason)
 
 
 def _check_watchdog(config: LoadedConfig, info: DeviceInfo) -> None:

@@ -89,6 +89,7 @@ class ControlTick:
         requested_n: what the laws asked for [N].
         position_m, velocity_m_per_s: as used by the last tick.
         dt_s: time between the last two samples [s].
+        origin_m: where the device places the point that positions count from, one element an axis [m].
         fault: code of a fault raised by the last tick, 0 when there was none; the loop takes and clears it.
         fault_text: what there is to say about it.
 
@@ -125,6 +126,7 @@ class ControlTick:
         self.position_m = [0.0] * axes
         self.velocity_m_per_s = [0.0] * axes
         self.dt_s = period_s
+        self.origin_m = [0.0] * axes
         self.fallback = False
         self.fault = 0
         self.fault_text = ""
@@ -141,6 +143,7 @@ class ControlTick:
         self._sequence = -1
         self._frozen = 0
         self._blind = True
+        self._excused = False
         self._blind_gain = 0.0
         self._blind_from_n = [0.0] * axes
 
@@ -171,9 +174,10 @@ class ControlTick:
         self._time_ns = sample.time_ns
         self._sequence = sample.sequence
         self._blind = not self._possible(sample)
-        if self._blind:
+        self._excused = not sample.calibrated
+        if self._blind and sample.calibrated:
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
-        else:
+        if not self._blind:
             for axis in self._axes:
                 self.position_m[axis] = position_m = sample.position_m[axis]
                 self.estimators[axis].start(position_m)
@@ -198,6 +202,17 @@ class ControlTick:
         for contact in self._active:
             self._blend(contact)
         return True
+
+    def tare(self) -> bool:
+        """Count positions from here on. False while forces are let through or nobody knows where the device is."""
+        if self._blind or self.guard.mode is not Mode.DISARMED:
+            return False
+        self._move_origin([origin + at for origin, at in zip(self.origin_m, self.position_m, strict=True)])
+        return True
+
+    def forget_origin(self) -> None:
+        """Count positions as the device does, for one that is disarmed."""
+        self._move_origin([0.0 for _ in self._axes])
 
     def switch(
         self,
@@ -283,7 +298,7 @@ class ControlTick:
         seen = self._see(sample, clock_dt_s)
         if not seen or self._blind:
             if not seen or self._blind_gain > 0.0:
-                return self._step_blind()
+                return self._step_blind(sample.calibrated)
             self._see_again()
         position_m = self.position_m
         velocity_m_per_s = self.velocity_m_per_s
@@ -319,6 +334,15 @@ class ControlTick:
             self._drop_gone()
         return force_n
 
+    def _move_origin(self, origin_m: list[float]) -> None:
+        for axis in self._axes:
+            self.position_m[axis] += self.origin_m[axis] - origin_m[axis]
+            self.velocity_m_per_s[axis] = 0.0
+            self.estimators[axis].start(self.position_m[axis])
+        self.origin_m = origin_m
+        for contact in self._active:
+            contact.start(self.position_m[contact.wall.axis])
+
     def _fallback_law(self) -> RunningLaw:
         params = fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m)
         return RunningLaw(fallback, params)
@@ -350,11 +374,13 @@ class ControlTick:
             if not MOST_S <= dt_s < math.inf:
                 dt_s = 0.0
         speed_squared = 0.0
+        origin_m = self.origin_m
         for axis in self._axes:
             position_m = sample.position_m[axis]
             low_m, high_m = self._bounds_m[axis]
             if not low_m <= position_m <= high_m:  # false for NaN as well
                 return False
+            position_m -= origin_m[axis]
             if self._blind:
                 self.estimators[axis].start(position_m)
             velocity_m_per_s = self.estimators[axis].update(position_m, dt_s, sample.velocity_m_per_s[axis])
@@ -378,12 +404,16 @@ class ControlTick:
         for each in self._active:
             each.act()
 
-    def _step_blind(self) -> list[float]:
-        """Let the last force out quickly: without a position there is no wall."""
+    def _step_blind(self, calibrated: bool) -> list[float]:
+        """Let the last force out quickly: without a position there is no wall.
+
+        That a device which is not calibrated does not know where it is is no fault: it has no force.
+        """
         force_n = self.force_n
         guard = self.guard
-        if not self._blind or guard.mode is Mode.ARMED:
+        if guard.mode is Mode.ARMED or (calibrated and (self._excused or not self._blind)):
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
+        self._excused = not calibrated
         if not self._blind:
             self._blind = True
             self._blind_gain = 1.0

@@ -10,6 +10,7 @@ from hapticd.config.loading import LoadedConfig
 from hapticd.contracts.event import Event, EventCode
 from hapticd.faults.receipt import receipt
 from hapticd.supervisor.controlled import Control
+from hapticd.supervisor.metrics import MetricWatch
 from hapticd.supervisor.recorder import FaultRecorder
 from hapticd.supervisor.report import Report
 from hapticd.telemetry.publisher import Publisher
@@ -48,6 +49,7 @@ class Chronicle:
         self._publisher = publisher
         self._report = report
         self._offset_ns = epoch_offset_ns
+        self._metrics = MetricWatch()
         self._subscriptions = (time.monotonic(), 0)
         self._flood_due_s = 0.0
 
@@ -60,7 +62,8 @@ class Chronicle:
             control: to which loop; the ring of a fault's ticks is its.
         """
         level = logging.ERROR if event.is_fault else logging.WARNING if event.code >= 300 else logging.INFO
-        log.log(level, "%s", event.text, extra={"code": event.code, "tick": event.seq})
+        fields = {"instance": self._instance, "code": int(event.code), "tick": event.seq}
+        log.log(level, "%s", event.text, extra=fields | {"law": config.config.controller.law})
         self._publisher.event(event)
         self._report.add_event(event)
         self.news = True
@@ -81,12 +84,14 @@ class Chronicle:
         self.tell(Event(code, text, seq, time.monotonic_ns(), fields), config, control)
 
     def turn(self, config: LoadedConfig, control: Control) -> None:
-        """Go on with fault records, and look at subscribers; returns at once."""
+        """Go on with fault records, and look at subscribers and at the driver's metrics; returns at once."""
         problem = self.recorder.turn(config.config.faults.keep)
         if problem:
             self.tell_now(EventCode.FAULT_RECORD_FAILED, problem, config, control)
-        since_s, before = self._subscriptions
         now_s = time.monotonic()
+        for text, fields in self._metrics.grown(config.driver.METRICS, control.shared.metrics, now_s):
+            self.tell_now(EventCode.DEVICE_WARNING, text, config, control, **fields)
+        since_s, before = self._subscriptions
         if now_s - since_s < _FLOOD_WINDOW_S:
             return
         count = self._publisher.counts.subscriptions

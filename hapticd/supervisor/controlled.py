@@ -35,6 +35,8 @@ class Control:
         info: what the device declared.
         realtime: whether its scheduling and memory are as a loop needs them.
         warnings: what it could not have, and who can grant it.
+        accuracy: the device model that it chose, and why; "" when it was not asked to.
+        fitted_hash: of the configuration that it chose for.
         shared: the memory shared with it.
         reader: its tick records.
         events: its events.
@@ -47,9 +49,12 @@ class Control:
         info: dict[str, Any] = hello["info"]
         info["axes"] = tuple(info["axes"])
         info["workspace_m"] = tuple(tuple(span) for span in info["workspace_m"])
+        info["notes"] = tuple(info["notes"])
         self.info = DeviceInfo(**info)
         self.realtime: bool = hello["realtime"]
         self.warnings: list[str] = hello["warnings"]
+        self.accuracy: str = hello["accuracy"]
+        self.fitted_hash = config.hash
         layout = RecordLayout(len(self.info.axes), self.info.has_orientation, MAX_WALLS)
         self.shared = SharedMemory(layout, config.config.loop.rate_hz, descriptor)
         self.reader = RecordReader(self.shared)

@@ -1,4 +1,4 @@
-"""A device that was lost is looked for until it is back: soon at first, then less often."""
+"""A device that was lost is looked for until it is back: soon at first, then less often, and when one is plugged in."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.record import Flag, TickRecord
 from hapticd.control.predecessor import NOBODY, Predecessor, identity
 from hapticd.control.shared import RECORDS
+from hapticd.supervisor.arrivals import Arrivals
 from hapticd.supervisor.controlled import Control
 from hapticd.supervisor.start import Start
 
 FIRST_S = 1.0
 LONGEST_S = 30.0
 """Time to the first try and the longest between two; each wait is twice the one before [s]."""
+
+SETTLE_S = 1.0
+"""From something being plugged in to the try: udev has to give it its rights first [s]."""
 
 STEADY_S = 60.0
 """A device that has been there for so long is looked for as if it were lost for the first time [s]."""
@@ -41,14 +45,16 @@ class Recovery:
         self._wait_s = FIRST_S
         self._found_s = 0.0
         self._start: Start | None = None
+        self._arrivals = Arrivals()
 
-    def begin(self, control: Control, last: TickRecord, latched: bool, why: str) -> None:
+    def begin(self, control: Control, last: TickRecord, latched: bool, tared: bool, why: str) -> None:
         """Look for a device that has just been lost.
 
         Args:
             control: the process that lost it and is about to end.
             last: the last tick that was fetched, of that process or of one before it.
             latched: a fault is not cleared.
+            tared: walls stand where they will not stand for the next process, so nobody arms by himself.
             why: how it was lost.
         """
         now_s = time.monotonic()
@@ -56,12 +62,13 @@ class Recovery:
             self._wait_s = FIRST_S
         self.lost = True
         self.lost_s = now_s
+        self._arrivals = Arrivals()
         if control.shared.words[RECORDS]:
             self.before = Predecessor(
                 seq=last.seq + 1,
                 skipped=control.skipped,
                 law=last.law,
-                may_arm=bool(last.flags & Flag.ARMED),
+                may_arm=bool(last.flags & Flag.ARMED) and not tared,
                 latched=latched or bool(last.flags & Flag.LATCHED),
                 device=identity(control.info),
             )
@@ -81,6 +88,9 @@ class Recovery:
                 lost.kill()
             return None
         now_s = time.monotonic()
+        if self._arrivals.news():
+            self._wait_s = FIRST_S
+            self.next_try_s = min(self.next_try_s, now_s + SETTLE_S)
         try:
             if self._start is None:
                 if now_s >= self.next_try_s:

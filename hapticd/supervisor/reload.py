@@ -1,28 +1,142 @@
-"""A configuration that is to take over from the running one: what it may change, and the letter that tells the loop."""
+"""The configuration file taken over by a running daemon: what of it may change, the letter that tells the loop."""
 
 from __future__ import annotations
 
-from typing import Any
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
 
 from hapticd.config.loading import LoadedConfig, load
-from hapticd.contracts.errors import HapticdError
+from hapticd.config.problems import key_path, shown_value
+from hapticd.contracts.errors import ConfigError, HapticdError
+from hapticd.contracts.event import EventCode
+from hapticd.keys.access import key_ring
+from hapticd.supervisor.requests import Answer
+from hapticd.supervisor.watcher import FileWatcher
+
+if TYPE_CHECKING:
+    from hapticd.supervisor.service import Service
+
+LIVE: Final = (
+    "scene",
+    "controller",
+    "safety",
+    "telemetry.batch_ticks",
+    "telemetry.every_ticks",
+    "faults",
+    "service",
+)
+"""Tables and keys that may change while the loop runs; everything else needs a restart."""
 
 
-def wanted_config(now: LoadedConfig) -> LoadedConfig:
-    """Read the file of a configuration again.
+class Reload:
+    """Takes the file over, when somebody asks or, where the file says so, when it is saved; one at a time.
 
-    Raises:
-        HapticdError: it cannot be used, or changes what only a restart can change.
+    Args:
+        service: the daemon that it is for.
     """
-    wanted = load(now.path)
-    old, new = now.config, wanted.config
-    fixed = [name for name in ("loop", "device", "velocity") if getattr(old, name) != getattr(new, name)]
-    endpoints = [(table.ipc, table.tcp, table.send_high_water) for table in (old.telemetry, new.telemetry)]
-    if endpoints[0] != endpoints[1]:
-        fixed.append("telemetry endpoints")
-    if fixed:
-        raise HapticdError(f"{wanted.path}: [{'], ['.join(fixed)}] changed: that needs a restart")
-    return wanted
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._waiting: list[Answer] = []
+        self._under_way = False
+        self._watcher: FileWatcher | None = None
+        self._follow()
+
+    def ask(self, answer: Answer) -> None:
+        """Read the file again at the next turn; a file that cannot be used changes nothing.
+
+        Args:
+            answer: told "" when the file is in force, else why it is not.
+        """
+        self._waiting.append(answer)
+
+    def turn(self) -> None:
+        """Begin what was asked for, or what was saved; returns at once."""
+        if self._under_way:
+            return
+        saved = self._watcher.take() if self._watcher is not None else None
+        if self._waiting:
+            answers, self._waiting = self._waiting, []
+            try:
+                self._begin(load(self._service.config.path), answers)
+            except HapticdError as error:
+                self._refuse(str(error), answers)
+        elif isinstance(saved, ConfigError):
+            self._refuse(str(saved), [])
+        elif saved is not None and saved.text != self._service.config.text:
+            self._begin(saved, [])
+
+    def close(self) -> None:
+        """Look at the file no more; the daemon ends."""
+        if self._watcher is not None:
+            self._watcher.close()
+            self._watcher.wait_closed()
+
+    def _begin(self, wanted: LoadedConfig, answers: list[Answer]) -> None:
+        service = self._service
+        service.notifier.send("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
+        problems = [*needs_restart(service.config, wanted)]
+        try:
+            ring = key_ring(wanted)
+        except HapticdError as error:
+            problems.append(str(error))
+        if problems:
+            self._refuse("\n".join(problems), answers)
+            return
+
+        def finish(verdict: str) -> None:
+            self._under_way = False
+            if verdict:
+                self._refuse(f"{wanted.path}: {verdict}", answers)
+                return
+            service.adopt(wanted, ring)
+            self._follow()
+            service.notifier.send("READY=1")
+            for answer in answers:
+                answer("")
+
+        self._under_way = True
+        if service.recovery.lost:
+            before = service.recovery.before
+            other_law = not same_law(service.config, wanted)
+            service.recovery.amend(replace(before, law=before.law + other_law))
+            text = f"configuration {wanted.hash}: in force when the device is back"
+            service.chronicle.tell_now(EventCode.SWITCHED, text, service.config, service.control)
+            finish("")
+        else:
+            service.requests.submit(switch_letter(service.config, wanted), finish)
+
+    def _refuse(self, why: str, answers: list[Answer]) -> None:
+        service = self._service
+        text = f"configuration refused, nothing changed: {why}"
+        service.chronicle.tell_now(EventCode.REFUSED, text, service.config, service.control)
+        service.notifier.send("READY=1")
+        for answer in answers:
+            answer(why)
+
+    def _follow(self) -> None:
+        """Look at the file, or not, as it says itself."""
+        wanted = self._service.config.config.service.reload_on_save
+        if wanted and self._watcher is None:
+            self._watcher = FileWatcher(self._service.config.path, self._service.config.text)
+        elif self._watcher is not None and not wanted:
+            self._watcher.close()
+            self._watcher = None
+
+
+def needs_restart(now: LoadedConfig, wanted: LoadedConfig) -> Iterator[str]:
+    """A line for each key that differs and that only a restart can change."""
+    for key, old, new in _differences(_meaning(now), _meaning(wanted), ()):
+        name = key_path(key)
+        if not any(name == live or name.startswith((f"{live}.", f"{live}[")) for live in LIVE):
+            yield f"{wanted.path}: {name} = {_shown(new)}: needs a restart, {_shown(old)} is in force"
+
+
+def same_law(now: LoadedConfig, wanted: LoadedConfig) -> bool:
+    """Whether the law and what its parameters mean are the same."""
+    return now.config.controller.law == wanted.config.controller.law and now.params == wanted.params
 
 
 def switch_letter(now: LoadedConfig, wanted: LoadedConfig) -> dict[str, Any]:
@@ -34,7 +148,26 @@ def switch_letter(now: LoadedConfig, wanted: LoadedConfig) -> dict[str, Any]:
         "params": wanted.params.model_dump(),
         "scene": settings.scene.model_dump(),
         "safety": settings.safety.model_dump(),
-        "keep_law": settings.controller == now.config.controller,
+        "keep_law": same_law(now, wanted),
         "was": now.config.controller.law,
         "config": wanted.hash,
     }
+
+
+def _meaning(loaded: LoadedConfig) -> dict[str, Any]:
+    """Every key with its value, defaults filled in."""
+    tables = loaded.config.model_dump()
+    tables["device"]["options"] = loaded.options.model_dump()
+    return tables
+
+
+def _differences(old: object, new: object, at: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], object, object]]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [*old, *(key for key in new if key not in old)]:
+            yield from _differences(old.get(key), new.get(key), (*at, key))
+    elif old != new:
+        yield at, old, new
+
+
+def _shown(value: object) -> str:
+    return "not set" if value is None else shown_value(value)

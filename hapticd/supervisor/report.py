@@ -8,8 +8,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import hapticd
-from hapticd.contracts.event import Event
+from hapticd.contracts.event import Event, EventCode
 from hapticd.contracts.record import Flag, TickRecord
+from hapticd.supervisor.metrics import values_of
+from hapticd.supervisor.walls import WallTimes
 from hapticd.telemetry.status import LateHistogram, Status
 from hapticd.telemetry.wire import timestamp_s
 
@@ -50,6 +52,8 @@ class Report:
         self._dropped = 0
         self._rate_from = (time.monotonic(), 0)
         self._fault: Event | None = None
+        self._origin_m: dict[str, float] = {}
+        self._walls = WallTimes()
 
     def add(self, records: Sequence[TickRecord]) -> None:
         """Count ticks."""
@@ -64,7 +68,9 @@ class Report:
             self._law = self.last.law
 
     def expect(self, before: Predecessor) -> None:
-        """A loop that has not ticked yet goes on from there."""
+        """A loop that has not ticked yet goes on from there; it does not know what the one before was tared to."""
+        self._origin_m = {}
+        self._walls.forget()
         self._flags = Flag.LATCHED if before.latched else 0
         self._law = before.law
 
@@ -73,9 +79,16 @@ class Report:
         self._dropped += ticks
 
     def add_event(self, event: Event) -> None:
-        """Remember the last fault."""
+        """Remember the last fault, and where positions count from."""
         if event.is_fault:
             self._fault = event
+        elif event.code in (EventCode.TARED, EventCode.CALIBRATED):
+            self._origin_m = {name: float(value) for name, value in event.fields.items()}
+
+    @property
+    def tared(self) -> bool:
+        """Whether positions count from elsewhere than the device does."""
+        return any(self._origin_m.values())
 
     def make(self, config: LoadedConfig, control: Control, recovery: Recovery, fault_records: int) -> Status:
         """The status as it is now."""
@@ -84,6 +97,8 @@ class Report:
         info = control.info
         if recovery.lost:
             self.expect(recovery.before)
+        seq = self.last.seq if self.last else 0
+        self._walls.take(settings.scene.walls, seq)
         flags = self._flags
         limit_n = settings.safety.max_force_n or info.max_force_n
         lifted = settings.safety.profile == "simulation" or limit_n == math.inf
@@ -108,15 +123,19 @@ class Report:
             device=info.model,
             serial=info.serial,
             simulated=info.simulated,
+            calibrated=not flags & Flag.UNCALIBRATED,
+            device_metrics=values_of(config.driver.METRICS, control.shared.metrics),
+            accuracy=_accuracy(control.accuracy, control.fitted_hash, config.hash),
             axes=info.axes,
+            origin_m=tuple(self._origin_m.get(f"origin_{axis}_m", 0.0) for axis in info.axes),
             max_force_n=0.0 if lifted else limit_n,
             wall_axis=tuple(wall.axis for wall in settings.scene.walls),
             wall_position_m=tuple(wall.position_m for wall in settings.scene.walls),
-            wall_stiffness_n_per_m=tuple(wall.stiffness_n_per_m for wall in settings.scene.walls),
-            config_file=str(config.path),
+            wall_stiffness_n_per_m=self._walls.stiffness_n_per_m(seq, settings.loop.period_s),
+            config_file=str(config.path.absolute()),
             config_hash=config.hash,
             realtime=control.realtime,
-            warnings=(*((_missing(recovery),) if recovery.lost else ()), *control.warnings),
+            warnings=(*((_missing(recovery),) if recovery.lost else ()), *control.warnings, *info.notes),
             device_lost_timestamp=self._epoch_s(recovery.lost_s) if recovery.lost else 0.0,
             next_try_timestamp=self._epoch_s(recovery.next_try_s) if recovery.lost else 0.0,
             fault_code=self._fault.code if self._fault else 0,
@@ -135,6 +154,12 @@ class Report:
 
     def _epoch_s(self, monotonic_s: float) -> float:
         return timestamp_s(round(monotonic_s * 1e9), self._offset_ns)
+
+
+def _accuracy(reason: str, fitted_hash: str, hash_now: str) -> str:
+    if reason and fitted_hash != hash_now:
+        return f"{reason}; chosen for configuration {fitted_hash}, a restart chooses again"
+    return reason
 
 
 def _missing(recovery: Recovery) -> str:

@@ -9,10 +9,11 @@ import time
 from dataclasses import replace
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.contracts.record import Flag, TickRecord
 from hapticd.faults.place import fault_directory
+from hapticd.keys.access import key_ring
+from hapticd.keys.directory import KeyRing
 from hapticd.supervisor.chronicle import Chronicle, log
 from hapticd.supervisor.commands import CommandSocket, Reply
 from hapticd.supervisor.controlled import END_TIMEOUT_S
@@ -20,7 +21,7 @@ from hapticd.supervisor.instance import InstanceLock
 from hapticd.supervisor.notify import Notifier
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.release import Release
-from hapticd.supervisor.reload import switch_letter, wanted_config
+from hapticd.supervisor.reload import Reload
 from hapticd.supervisor.report import Report
 from hapticd.supervisor.requests import Answer, Requests
 from hapticd.supervisor.start import Start
@@ -36,7 +37,7 @@ STOP_TIMEOUT_S = 3.0
 RECORD_TIMEOUT_S = 3.0
 """How long the end of the daemon waits for a fault record that is being written [s]."""
 
-KNOWN = ("status", "arm", "disarm", "calibrate", "clear", "reload", "stop")
+KNOWN = ("status", "arm", "disarm", "calibrate", "tare", "clear", "reload", "stop")
 """What the control socket understands."""
 
 
@@ -64,6 +65,7 @@ class Service:
         self.instance = instance
         self.notifier = Notifier()
         offset_ns = measure_epoch_offset_ns()
+        ring = key_ring(config)
         with contextlib.ExitStack() as undo:
             self.lock = InstanceLock(instance)
             undo.callback(self.lock.close)
@@ -73,16 +75,18 @@ class Service:
             undo.callback(self._end_control)
             self.release.wait_ready()
             self.publisher = Publisher(
-                config.config.telemetry, self.lock.directory / TELEMETRY, self.control.info, offset_ns
+                config.config.telemetry, self.lock.directory / TELEMETRY, self.control.info, offset_ns, ring
             )
             undo.callback(self.publisher.close)
-            self.commands = CommandSocket(self.lock.directory / CONTROL)
+            self.commands = CommandSocket(self.lock.directory / CONTROL, config.config.control.tcp, ring)
             undo.callback(self.commands.close)
             self._undo = undo.pop_all()
         self.requests = Requests(self.control.shared)
         self.recovery = Recovery()
         self.report = Report(instance, offset_ns)
         self.chronicle = Chronicle(instance, self.publisher, self.report, fault_directory(instance), offset_ns)
+        self.reload = Reload(self)
+        self._undo.callback(self.reload.close)
         self.exit_code: int | None = None
         self._device_lost: Event | None = None
         self._dropped_told = 0
@@ -97,6 +101,15 @@ class Service:
         finally:
             self._undo.close()
 
+    def adopt(self, config: LoadedConfig, ring: KeyRing | None) -> None:
+        """Go on with another configuration and other keys; the loop has its part already."""
+        self.config = config
+        self.publisher.reconfigure(config.config.telemetry)
+        if ring is not None:
+            self.publisher.admit(ring)
+            self.commands.admit(ring)
+        self._status_due_s = 0.0
+
     def _end_control(self) -> None:
         self.control.end()
         self.control.close()
@@ -105,7 +118,7 @@ class Service:
         loop = asyncio.get_running_loop()
         loop.add_signal_handler(signal.SIGTERM, self._stop, "SIGTERM")
         loop.add_signal_handler(signal.SIGINT, self._stop, "interrupt")
-        loop.add_signal_handler(signal.SIGHUP, self.reload, _nobody)
+        loop.add_signal_handler(signal.SIGHUP, self.reload.ask, _nobody)
         settings = self.config.config
         log.info(
             "%s: %s on %s at %g Hz, law %s, publishing on %s",
@@ -116,11 +129,15 @@ class Service:
             settings.controller.law,
             " and ".join(self.publisher.endpoints) or "nothing",
         )
+        if self.commands.endpoint is not None:
+            log.info("%s: taking commands on %s", self.instance, self.commands.endpoint)
         if self.control.realtime:
             for warning in self.control.warnings:
                 log.warning("%s", warning)
         else:
             self._tell_now(EventCode.NOT_REALTIME, f"not real-time: {'; '.join(self.control.warnings)}")
+        for note in self.control.info.notes:
+            log.warning("%s", note)
         while self.exit_code is None:
             self._turn()
             await asyncio.sleep(DRAIN_S)
@@ -134,6 +151,7 @@ class Service:
         self.control.beat()
         self._publish()
         self._obey()
+        self.reload.turn()
         if self.recovery.lost:
             self._look_for_device()
         else:
@@ -230,7 +248,8 @@ class Service:
         self.chronicle.recorder.loop_ended()
         self.requests.abandon(event.text)
         why = event.text.removeprefix("device lost: ")
-        self.recovery.begin(self.control, self.report.last or last, self.chronicle.latched, why)
+        report = self.report
+        self.recovery.begin(self.control, report.last or last, self.chronicle.latched, report.tared, why)
 
     def _control_lost(self, text: str) -> None:
         """The loop no longer looks after the device: take the force away from outside, and end."""
@@ -245,15 +264,15 @@ class Service:
             match request["do"]:
                 case "status":
                     reply(True, status=self.report.status.as_map())
-                case "arm" | "disarm" | "calibrate" | "clear" as do if self.recovery.lost:
+                case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if self.recovery.lost:
                     self._obey_without_device(do, reply)
-                case "arm" | "disarm" | "calibrate" | "clear" as do:
+                case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do:
                     self.requests.submit({"do": do}, _answering(reply))
                 case "reload" if request.get("wait"):
-                    self.reload(_answering(reply))
+                    self.reload.ask(_answering(reply))
                 case "reload":
                     reply(True)
-                    self.reload(_nobody)
+                    self.reload.ask(_nobody)
                 case "stop":
                     self._stop("asked over the control socket")
                     reply(True)
@@ -262,7 +281,7 @@ class Service:
 
     def _obey_without_device(self, do: str, reply: Reply) -> None:
         match do:
-            case "arm" | "calibrate":
+            case "arm" | "calibrate" | "tare":
                 reply(False, f"there is no device to {do}: {self.recovery.why}")
             case "disarm":
                 self.recovery.amend(replace(self.recovery.before, may_arm=False))
@@ -272,43 +291,6 @@ class Service:
                 self.recovery.amend(replace(self.recovery.before, latched=False))
                 self._tell_now(EventCode.CLEARED, "fault cleared")
                 reply(True)
-
-    def reload(self, answer: Answer) -> None:
-        """Read the configuration file again and hand law, scene and limits to the loop; a bad file changes nothing.
-
-        Args:
-            answer: told "" when the new configuration is in force, else why it is not.
-        """
-        self.notifier.send("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
-        try:
-            wanted = wanted_config(self.config)
-        except HapticdError as error:
-            self._refuse(str(error), answer)
-            return
-
-        def finish(verdict: str) -> None:
-            if verdict:
-                self._refuse(f"{wanted.path}: {verdict}", answer)
-                return
-            self.config = wanted
-            self.publisher.reconfigure(wanted.config.telemetry)
-            self.notifier.send("READY=1")
-            self._status_due_s = 0.0
-            answer("")
-
-        if self.recovery.lost:
-            before = self.recovery.before
-            other_law = wanted.config.controller != self.config.config.controller
-            self.recovery.amend(replace(before, law=before.law + other_law))
-            self._tell_now(EventCode.SWITCHED, f"configuration {wanted.hash}: in force when the device is back")
-            finish("")
-        else:
-            self.requests.submit(switch_letter(self.config, wanted), finish)
-
-    def _refuse(self, why: str, answer: Answer) -> None:
-        self._tell_now(EventCode.REFUSED, f"configuration refused, nothing changed: {why}")
-        self.notifier.send("READY=1")
-        answer(why)
 
     def _publish_status(self) -> None:
         status = self.report.make(self.config, self.control, self.recovery, self.chronicle.recorder.written)

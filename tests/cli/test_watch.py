@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import fcntl
 import itertools
 import json
@@ -48,6 +49,7 @@ STATUS = Status(
     driver="loopback",
     device="omega7",
     simulated=True,
+    device_metrics={"lost_frames": 3.0, "echo_us": 812.5},
     axes=("z",),
     wall_axis=("z",),
     wall_position_m=(0.0,),
@@ -162,14 +164,14 @@ def has_trace(terminal: Terminal) -> bool:
 
 
 def test_one_screen_says_all_that_matters(feed: Feed) -> None:
-    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+    with Terminal(feed, "--connect", feed.wire.endpoint) as terminal:
         terminal.shows("hapticd default")
         feed.wire.publisher.event(contract.Event(103, "law none -> energy-cycle", 1, 0))
         feed.wire.publisher.event(contract.Event(204, "device lost", 1, 0))
         terminal.shows("✗ device lost", "· law none -> energy-cycle")
         terminal.wait_for(lambda: has_trace(terminal), "traces")
         terminal.shows("111 ms", "kg")
-        header, warning, loop, boxes, *_, footer = terminal.lines
+        header, warning, loop, device, boxes, *_, footer = terminal.lines
         assert header.split() == [
             *("hapticd", "default", "omega7", "loopback,", "simulated"),
             *("law", "energy-cycle", "ARMED"),
@@ -179,6 +181,7 @@ def test_one_screen_says_all_that_matters(feed: Feed) -> None:
         assert "max 1.91 ms" in loop
         assert "late ticks 7" in loop
         assert "skipped 3" in loop
+        assert device == " device  lost_frames 3  echo_us 812.5"
         assert " position " in boxes
         assert " mm ╮" in boxes
         assert " force " in boxes
@@ -193,21 +196,21 @@ def test_one_screen_says_all_that_matters(feed: Feed) -> None:
 
 
 def test_q_ends_it(feed: Feed) -> None:
-    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+    with Terminal(feed, "--connect", feed.wire.endpoint) as terminal:
         terminal.shows("hapticd default")
         terminal.type(b"q")
         assert terminal.ended() == 0
 
 
 def test_an_interrupt_ends_it(feed: Feed) -> None:
-    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+    with Terminal(feed, "--connect", feed.wire.endpoint) as terminal:
         terminal.shows("hapticd default")
         terminal.type(b"\x03")
         assert terminal.ended() == 0
 
 
 def test_a_termination_ends_it_and_gives_the_terminal_back(feed: Feed) -> None:
-    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+    with Terminal(feed, "--connect", feed.wire.endpoint) as terminal:
         terminal.shows("hapticd default")
         terminal.process.send_signal(signal.SIGTERM)
         assert terminal.ended() == 0
@@ -215,7 +218,7 @@ def test_a_termination_ends_it_and_gives_the_terminal_back(feed: Feed) -> None:
 
 def test_it_waits_for_a_daemon_and_finds_it_again_after_a_restart(feed: Feed) -> None:
     feed.wire.publisher.close()
-    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+    with Terminal(feed, "--connect", feed.wire.endpoint) as terminal:
         terminal.shows("waiting for a daemon", feed.wire.endpoint, "hapticd run")
         feed.wire.restart()
         terminal.shows("hapticd default", "ARMED")
@@ -235,7 +238,7 @@ def test_an_instance_is_found_where_its_daemon_comes_up(feed: Feed, monkeypatch:
 
 @pytest.mark.parametrize(("columns", "rows"), [(50, 18), (132, 43)])
 def test_it_fills_whatever_size_the_terminal_has(feed: Feed, columns: int, rows: int) -> None:
-    with Terminal(feed, "--endpoint", feed.wire.endpoint) as terminal:
+    with Terminal(feed, "--connect", feed.wire.endpoint) as terminal:
         terminal.shows("hapticd default")
         terminal.resize(columns, rows)
         terminal.screen.reset()
@@ -247,7 +250,7 @@ def test_it_fills_whatever_size_the_terminal_has(feed: Feed, columns: int, rows:
 def plain(feed: Feed, *arguments: str, until: Callable[[str], bool], **environment: str) -> str:
     """What is printed when the output is no terminal, up to where enough has come."""
     process = subprocess.Popen(
-        [HAPTICD, "watch", "--endpoint", feed.wire.endpoint, *arguments],
+        [HAPTICD, "watch", "--connect", feed.wire.endpoint, *arguments],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, **environment},
     )  # fmt: skip
     assert process.stdout is not None
@@ -302,7 +305,7 @@ def test_once_without_a_daemon_fails_with_one_line(
     feed.wire.publisher.close()
     monkeypatch.setattr("hapticd.cli.watch._PATIENCE_S", 0.1)
     with pytest.raises(SystemExit) as ended:
-        main(["watch", "--once", "--endpoint", feed.wire.endpoint])
+        main(["watch", "--once", "--connect", feed.wire.endpoint])
     assert ended.value.code == 1
     text = f"hapticd: {feed.wire.endpoint}: no daemon answers; start one with `hapticd run`\n"
     assert capsys.readouterr().err == text
@@ -329,15 +332,24 @@ NUMBERS = st.floats(-1e300, 1e300) | st.floats(-1.0, 1.0)
     numbers=st.lists(NUMBERS, min_size=1, max_size=40),
     flags=st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans()),
     warnings=st.lists(st.text(), max_size=4),
+    metrics=st.dictionaries(st.text(alphabet="abc_", max_size=30), NUMBERS, max_size=8),
 )
 def test_whatever_is_known_the_picture_has_the_size_of_the_terminal(
-    width: int, height: int, axes: int, walls: int, numbers: list[float], flags: tuple[bool, ...], warnings: list[str]
+    width: int,
+    height: int,
+    axes: int,
+    walls: int,
+    numbers: list[float],
+    flags: tuple[bool, ...],
+    warnings: list[str],
+    metrics: dict[str, float],
 ) -> None:
     known = Known()
     armed, fallback, latched, told = flags
     if told:
         texts = tuple(" ".join(one.split()) for one in warnings)
-        known.take([Status(armed=armed, fallback=fallback, latched=latched, warnings=texts, axes=("x",) * axes)], 0.0)
+        status = Status(armed=armed, fallback=fallback, latched=latched, warnings=texts, axes=("x",) * axes)
+        known.take([dataclasses.replace(status, device_metrics=metrics)], 0.0)
     for index, number in enumerate(numbers):
         vector, at_s = (number,) * axes, index * 0.03
         known.take([Position(at_s, index, vector, vector, vector, (numbers[0],) * axes)], 0.0)
@@ -355,6 +367,13 @@ def test_a_latched_fault_says_how_to_go_on() -> None:
     text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
     assert "LATCHED" in text
     assert "hapticd clear" in text
+
+
+def test_a_device_that_is_not_calibrated_says_what_it_waits_for() -> None:
+    known = Known()
+    known.take([Status(calibrated=False, law="tdpa")], 0.0)
+    text = "\n".join(line.plain for line in frame(known, "ipc:///x", 100, 24, 0.0))
+    assert "hapticd calibrate" in text
 
 
 def test_late_ticks_are_those_of_160_us_and_more() -> None:

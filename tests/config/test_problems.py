@@ -70,9 +70,8 @@ EXAMPLES = {
     "[telemetry]\ntcp = 'tcp://127.0.0.1:99999'": (
         'telemetry.tcp = "tcp://127.0.0.1:99999": must be an address and a port, such as tcp://127.0.0.1:9872'
     ),
-    "[telemetry]\ntcp = 'tcp://0.0.0.0:9872'": (
-        'telemetry.tcp = "tcp://0.0.0.0:9872": must stay on this host, such as tcp://127.0.0.1:9872: '
-        "measurements are not encrypted"
+    "[control]\ntcp = 'tcp://lab:9873'": (
+        'control.tcp = "tcp://lab:9873": must be an address and a port, such as tcp://127.0.0.1:9873'
     ),
     # plug-ins
     "[device]\ndriver = 'lopback'": 'device.driver = "lopback": not installed; did you mean "loopback"?',

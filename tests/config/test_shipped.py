@@ -16,8 +16,8 @@ from hapticd.control.process import make_tick, place_device
 from hapticd.share import directory
 
 SHIPPED = sorted(directory("config").glob("*.toml"))
-REAL_DEVICES = {"omega7"}
-RESTS = ["fig6-set1", "fig6-set2-wall", "fig6-set2-device", "native-8-none"] + [
+REAL_DEVICES = {"hid-rig", "omega7", "serial-rig"}
+RESTS = ["fig6-set1", "fig6-set2-wall", "fig6-set2-device", "native-8-none", "every-term"] + [
     f"wall-{k}-{law}" for k in (12, 18, 20) for law in ("energy-cycle", "tdpa")
 ]
 OSCILLATES = [f"wall-{k}-{law}" for k in (12, 18, 20) for law in ("none", "tdpa-unbounded")]

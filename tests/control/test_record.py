@@ -81,5 +81,5 @@ def test_one_wall_too_many_or_a_missing_number_is_refused_and_not_written() -> N
 
 
 def test_the_state_bits_are_what_the_wire_says() -> None:
-    assert [flag.value for flag in Flag] == [1, 2, 4, 8, 16]
-    assert [flag.name for flag in Flag] == ["ARMED", "FALLBACK", "RELEASING", "LATCHED", "LIMITED"]
+    assert [flag.value for flag in Flag] == [1, 2, 4, 8, 16, 32]
+    assert [flag.name for flag in Flag] == ["ARMED", "FALLBACK", "RELEASING", "LATCHED", "LIMITED", "UNCALIBRATED"]

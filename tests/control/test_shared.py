@@ -14,8 +14,10 @@ import pytest
 from hapticd.config.models import MAX_WALLS
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import Event, EventCode
+from hapticd.contracts.metric import Metric
 from hapticd.contracts.record import RecordLayout, TickRecord
 from hapticd.control.shared import DONE, EVENTS, MAIL, RECORDS, EventReader, RecordReader, SharedMemory
+from hapticd_drivers.loopback import Loopback
 
 LAYOUT = RecordLayout(3, False, MAX_WALLS)
 RATE_HZ = 100.0  # 800 slots
@@ -250,6 +252,24 @@ def test_both_sides_of_a_descriptor_see_the_same_memory(shared: SharedMemory) ->
     assert [record.seq for record in RecordReader(other).read()] == [0, 1, 2]
     assert other.letter() == {"do": "arm"}
     assert [each.text for each in EventReader(shared).read()] == ["seen"]
+    other.close()
+
+
+def test_what_a_driver_counts_is_seen_on_the_other_side_from_the_first_on(shared: SharedMemory) -> None:
+    class Counting(Loopback):
+        METRICS = (Metric("frames", "frames that came"), Metric("echo_us", "age of the last one"))
+
+    driver = Counting(Counting.Options(), 1e-3)
+    driver.metrics[0] += 2  # counted before there was anybody to see it
+    driver.share_metrics(shared.metrics)
+    driver.metrics[0] += 1
+    driver.metrics[1] = 812.5
+    other = SharedMemory(LAYOUT, RATE_HZ, os.dup(shared.descriptor))
+    assert list(other.metrics[:3]) == [3.0, 812.5, 0.0]
+    write(other, 900)
+    other.post({"do": "arm"})
+    other.answer("no")
+    assert list(shared.metrics[:3]) == [3.0, 812.5, 0.0]
     other.close()
 
 

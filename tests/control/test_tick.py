@@ -515,6 +515,50 @@ def test_a_device_that_starts_with_nonsense_starts_with_a_fault_and_can_be_clear
     assert all(map(math.isfinite, rig.books_j))
 
 
+def uncalibrated(*, at_m: float) -> Rig:
+    """A disarmed device that does not know where it is."""
+    rig = Rig(wall(2000.0), at_m=0.05, arm=False)
+    rig.sample.calibrated = False
+    rig.sample.position_m[:] = [at_m]
+    rig.tick.start(rig.sample)
+    return rig
+
+
+@pytest.mark.parametrize("at_m", [math.nan, 5.0, -math.inf])
+def test_a_device_that_is_not_calibrated_may_say_anything_and_calibrated_it_needs_no_clearing(at_m: float) -> None:
+    rig = uncalibrated(at_m=at_m)
+    assert rig.forces(at_m, 30) == [0.0] * 30
+    assert rig.forces(0.0, 3) == [0.0] * 3
+    assert rig.forces(at_m, 30) == [0.0] * 30
+    assert rig.tick.fault == 0
+    assert not rig.tick.guard.latched
+    rig.sample.calibrated = True
+    rig.force(0.01)
+    assert rig.tick.fault == 0
+    assert rig.tick.arm()
+    rig.force(0.0)
+    assert rig.force(-1e-3) == 2.0
+
+
+def test_a_device_that_is_calibrated_and_still_makes_no_sense_is_a_fault() -> None:
+    rig = uncalibrated(at_m=5.0)
+    rig.forces(5.0, 30)
+    rig.sample.calibrated = True
+    assert rig.force(5.0) == 0.0
+    assert rig.tick.fault == EventCode.SAMPLE_IMPOSSIBLE
+    assert rig.tick.guard.latched
+
+
+def test_an_armed_device_that_forgets_where_it_is_is_a_fault() -> None:
+    rig = pressed()
+    rig.sample.calibrated = False
+    forces = rig.forces(5.0, 12)
+    assert forces[:2] == pytest.approx([3.6, 3.2])
+    assert forces[-1] == 0.0
+    assert rig.tick.fault == EventCode.SAMPLE_IMPOSSIBLE
+    assert rig.tick.guard.latched
+
+
 def test_a_device_may_be_half_its_workspace_outside_of_it_and_no_further() -> None:
     rig = Rig(wall(2000.0), workspace_m=((-0.1, 0.1),))
     rig.force(0.19, dt_s=0.1)

@@ -22,7 +22,7 @@ from hapticd.contracts.record import RecordLayout, TickRecord
 from hapticd.control.shared import RECORDS, RecordReader, SharedMemory
 
 HAPTICD = str(Path(sys.executable).parent / "hapticd")
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 """How long anything may take on a busy machine before a test gives up."""
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from tests.daemon.running import Daemon, Subscriber
 
-AT_ONCE = 12
+AT_ONCE = 6
 RUN_TICKS = 6000
 LAST_TICKS = 500
 COUNT_M = 1e-5

@@ -1,0 +1,147 @@
+"""Another law is put into a file as a careful person would do it: nothing else moves, no comment is lost."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hapticd.config.editing import with_law
+from hapticd.contracts.errors import ConfigError
+from hapticd.share import directory
+
+REFERENCE = (directory("config") / "hapticd.toml").read_text()
+
+LAYOUTS = {
+    "the reference": REFERENCE,
+    "nothing": "",
+    "comments only": "# my lab\n",
+    "no line end": "[loop]\nrate_hz = 1000.0",
+    "an empty table": "[controller]\n# which law\n\n# limits\n[safety]\nramp_s = 0.1\n",
+    "no parameters": "[controller] # c\nlaw = 'energy-cycle' # l\n\n[[scene.walls]]\nstiffness_n_per_m = 1.0\n",
+    "parameters only": "[controller.params]\nwindow = 2 # w\n\n# limits\n[safety]\nramp_s = 0.1\n",
+    "far apart": "[controller]\nlaw = 'energy-cycle'\n[loop]\ncpu = 0\n[controller.params]\n# head\nwindow = 2\n",
+    "backwards": "[controller.params]\nwindow = 2\n[loop]\ncpu = 0\n[controller]\nlaw = 'energy-cycle'\n[safety]\n",
+    "in a line": "controller = { law = 'energy-cycle', params = { window = 2 } } # c\n[safety]\nramp_s = 0.1\n",
+    "parameters in a line": "[controller]\nlaw = 'energy-cycle'\nparams = { window = 2, cap = 'none' } # p\n[loop]\n",
+    "dotted": "controller.law = 'energy-cycle' # l\nloop.cpu = 0\ncontroller.params.window = 2 # w\n[safety]\n",
+    "dotted inside": "[controller]\nlaw = 'energy-cycle'\nparams.window = 2 # w\n# tail\n\n[safety]\nramp_s = 0.1\n",
+    "indented": "[controller]\n  law = 'energy-cycle'\n\n  [controller.params]\n  window = 2\n\n[safety]\n",
+    "from Windows": "\ufeff[controller]\r\nlaw = 'energy-cycle' # l\r\n\r\n[controller.params]\r\nwindow = 2\r\n",
+}
+LAWS: list[tuple[str, dict[str, Any]]] = [
+    ("energy-cycle", {}),
+    ("energy-cycle", {"window": 1, "cap_share": 0.5, "rule": "signed"}),
+    ("tdpa", {"damping_cap_n_s_per_m": 20, "reset": "never"}),
+    ("none", {}),
+]
+
+
+def plain(text: str) -> dict[str, Any]:
+    data = tomllib.loads(text.removeprefix("\ufeff") + "\n")
+    data.setdefault("controller", {}).setdefault("params", {})
+    return data
+
+
+def comments(text: str) -> list[str]:
+    return re.findall(r"#[^\r\n]*", text)
+
+
+@pytest.mark.parametrize(("law", "params"), LAWS, ids=lambda part: part if isinstance(part, str) else str(len(part)))
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_in_every_layout_the_law_changes_and_nothing_else(layout: str, law: str, params: dict[str, Any]) -> None:
+    text = LAYOUTS[layout]
+    before, after = plain(text), plain(edited := with_law(text, "lab.toml", law, params))
+    kept = before["controller"]["params"] if law == "energy-cycle" else {}
+    assert after.pop("controller") == {"law": law, "params": {**kept, **params}}
+    before.pop("controller")
+    assert after == before
+    of_keys_that_left = 1 if law != "energy-cycle" else 0
+    assert len([comment for comment in comments(text) if comment not in edited]) <= of_keys_that_left
+    assert edited.startswith("\ufeff") == text.startswith("\ufeff")
+    assert edited.endswith("\n")
+
+
+def test_a_new_parameter_stands_with_its_like_and_not_below_the_comment_that_heads_the_next_table() -> None:
+    edited = with_law(LAYOUTS["parameters only"], "lab.toml", "energy-cycle", {"cap_share": 0.5})
+    assert "window = 2 # w\ncap_share = 0.5\n\n# limits\n[safety]\n" in edited
+
+
+def test_what_the_law_before_was_set_to_stays_behind_as_one_comment_a_law() -> None:
+    text = LAYOUTS["indented"]
+    for cap_share in (0.3, 0.4, 0.5):
+        text = with_law(text, "lab.toml", "energy-cycle", {"cap_share": cap_share})
+        text = with_law(text, "lab.toml", "tdpa", {"min_speed_m_per_s": cap_share})
+    text = with_law(text, "lab.toml", "none", {})
+    assert [comment for comment in comments(text) if "energy-cycle" in comment] == ["# energy-cycle: cap_share = 0.5"]
+    assert [comment for comment in comments(text) if "tdpa" in comment] == ["# tdpa: min_speed_m_per_s = 0.5"]
+    assert plain(text)["controller"] == {"law": "none", "params": {}}
+
+
+def test_there_and_back_again_is_the_same_file() -> None:
+    there = with_law(REFERENCE.replace("window = 2 ", "# window = 2 "), "lab.toml", "none", {})
+    assert with_law(there, "lab.toml", "energy-cycle", {}) == REFERENCE.replace("window = 2 ", "# window = 2 ")
+
+
+@pytest.mark.parametrize(
+    ("text", "law", "params", "named"),
+    [
+        ("", "tdap", {}, r'controller\.law = "tdap": .*"tdpa"'),
+        ("", "tdpa", {"damping_cap_n_s_per_m": -1}, r"controller\.params\.damping_cap_n_s_per_m = -1: must be from 0"),
+        ("", "tdpa", {"window": 2}, r"controller\.params\.window = 2: unknown key"),
+        ("", "none", {"": 1}, "unknown key"),
+        ("[loop]\nrate_hz = 1.0\n", "none", {}, r"loop\.rate_hz = 1\.0"),
+        ("[[[", "none", {}, "line 1.*not TOML"),
+        ("[" * 5000, "none", {}, "lab.toml"),
+        ("controller = 3\n", "none", {}, "controller = 3"),
+        ("[controller]\nparams = 3\n", "none", {}, r"controller\.params = 3"),
+        ("[[controller]]\n", "none", {}, "controller"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_name(text: str, law: str, params: dict[str, Any], named: str) -> None:
+    with pytest.raises(ConfigError, match=named):
+        with_law(text, "lab.toml", law, params)
+
+
+TOML_LINES = st.sampled_from(
+    [
+        *("[controller]", "[controller.params]", "law = 'tdpa'", "law = 3", "window = 2", "min_speed_m_per_s = 0.1"),
+        *(
+            "controller.law = 'none'",
+            "controller.params.window = 2 # c",
+            "params = { window = 1 }",
+            "params.window = 1",
+        ),
+        *(
+            "[safety]",
+            "ramp_s = 0.1",
+            "# a comment",
+            "",
+            "[[scene.walls]]",
+            "stiffness_n_per_m = 1.0",
+            "'''",
+            "\t",
+            "\r",
+        ),
+        *("law = '''", 'law = "x\\ny = 1"', "[controller.params.deeper]", "window = nan"),
+    ]
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(lines=st.lists(TOML_LINES, max_size=12), law=st.sampled_from(["none", "tdpa", "energy-cycle"]))
+def test_whatever_the_file_says_it_is_edited_rightly_or_refused(lines: list[str], law: str) -> None:
+    text = "\n".join(lines)
+    try:
+        edited = with_law(text, "lab.toml", law, {})
+    except ConfigError:
+        return
+    before, after = plain(text), plain(edited)
+    assert after["controller"]["law"] == law
+    assert {key: value for key, value in after.items() if key != "controller"} == {
+        key: value for key, value in before.items() if key != "controller"
+    }

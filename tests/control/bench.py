@@ -1,0 +1,58 @@
+"""A control loop on a bench, without its clock: letters are worked off as between the ticks of a running one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hapticd import registry
+from hapticd.config.loading import LoadedConfig
+from hapticd.contracts.event import Event
+from hapticd.contracts.record import RecordLayout
+from hapticd.control.loop import ControlLoop
+from hapticd.control.process import make_tick
+from hapticd.control.shared import DONE, MAIL, EventReader, SharedMemory
+from hapticd.control.tick import ControlTick
+from hapticd.guard import Mode
+
+PERIOD_S = 1e-3
+
+
+class Bench:
+    """A loop that ticks when it is told to, disarmed at first."""
+
+    def __init__(self, start: LoadedConfig) -> None:
+        self.driver = start.driver(start.options, PERIOD_S)
+        info = self.driver.open()
+        self.shared = SharedMemory(RecordLayout(1, False, 8), 1000.0)
+        self.tick = make_tick(start, info)
+        settings = start.config
+        self.loop = ControlLoop(
+            self.driver, self.tick, self.shared, settings.loop, settings.safety, False, lambda deadline_ns: deadline_ns
+        )
+        for name in registry.names(registry.CONTROLLERS):
+            self.loop.letters.know(name, registry.law(name))
+        self.tick.start(self.driver.read())
+        self.events = EventReader(self.shared)
+
+    def ticks(self, count: int) -> ControlTick:
+        """The tick, so many of them later."""
+        for _ in range(count):
+            force_n = self.tick.step(self.driver.read(), PERIOD_S)
+            if self.tick.guard.mode is not Mode.DISARMED:
+                self.driver.write(force_n)
+        return self.tick
+
+    def ask(self, **letter: Any) -> str:
+        """The verdict, once the letter is worked off, a slice a tick."""
+        self.shared.post(letter)
+        while self.shared.words[MAIL] != self.shared.words[DONE]:
+            self.ticks(1)
+            self.loop.letters.work()
+        return self.shared.verdict()
+
+    def close(self) -> None:
+        self.driver.close()
+        self.shared.close()
+
+    def told(self) -> dict[int, Event]:
+        return {event.code: event for event in self.events.read()}

@@ -1,0 +1,97 @@
+"""What a configuration allows and what a study promises is kept in the daemon: telemetry against the full model."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+
+import pytest
+
+from hapticd.cli.picture import Known, frame
+from hapticd.config.loading import load, parse
+from hapticd.control.fitting import track
+from hapticd.share import directory
+from hapticd.simulation.options import SimulationOptions
+from hapticd.study.played import play
+from hapticd.study.scene.study import study
+from hapticd.telemetry.status import Status
+from tests.daemon.running import Daemon, Subscriber
+
+TICKS = 2500
+CONFIG = """
+[device.options]
+model = "omega7"
+initial_position_m = 0.002
+resolution_m = 0.0
+coulomb_n = 1e-4
+noise_m = 1e-9
+bandwidth_hz = 2000.0
+force_delay_samples = 1
+hand = {{ force = {{ profile = "step", at_s = 1.0, newton = -3.0 }}, stiffness_n_per_m = 1.0, damping_n_s_per_m = 2.0 }}
+{accuracy}
+[[scene.walls]]
+stiffness_n_per_m = 2000.0
+"""
+
+
+@pytest.mark.parametrize(("position_m", "least_error_m"), [(1e-6, 1e-9), (3e-4, 1e-5)])
+def test_the_daemon_errs_by_no_more_than_was_allowed(position_m: float, least_error_m: float) -> None:
+    """And by something: the model that runs is not the full one."""
+    full = parse(CONFIG.format(accuracy=""), "full.toml")
+    assert isinstance(full.options, SimulationOptions)
+    exact = track(full, full.options, TICKS)
+    errors_m = []
+    errors_j = []
+    text = CONFIG.format(accuracy=f"accuracy = {{ position_m = {position_m}, over_s = 2.5 }}")
+    with Daemon(text) as daemon, Subscriber(daemon.wait_ready().endpoint) as subscriber:
+        told = ""
+        for topic, fields in subscriber.maps():
+            if topic == "hapticd/status":
+                told = fields["accuracy"]
+            if topic == "hapticd/position" and fields["seq"] < TICKS:
+                errors_m.append(abs(fields["position_m"][0] - exact.x_m[fields["seq"]]))
+            if topic == "hapticd/energy" and fields["seq"] < TICKS:
+                errors_j.append(abs(fields["energy_j"] - exact.energy_j[fields["seq"]]))
+            if fields["seq"] >= TICKS and told:
+                break
+        daemon.config.write_text(text.replace("stiffness_n_per_m = 2000.0", "stiffness_n_per_m = 2100.0"))
+        os.kill(daemon.process.pid, signal.SIGHUP)
+        for topic, fields in subscriber.maps():
+            if topic == "hapticd/status" and fields["wall_stiffness_n_per_m"] == [2100.0]:
+                assert fields["accuracy"].startswith(told + "; chosen for configuration ")
+                break
+    assert len(errors_m) > TICKS // 2
+    assert least_error_m < max(errors_m) <= position_m + 4e-9  # the sensor's noise, which the true position has not
+    assert max(errors_j) > 0.0
+    assert told.startswith("exact step without ")
+    assert " instead of " in told
+    known = Known()
+    known.take([Status(accuracy=told, armed=True)], 0.0)
+    assert told in " ".join(" ".join(line.plain.split()) for line in frame(known, "ipc://lab", 80, 40, 0.0))
+
+
+def test_the_smallest_model_of_a_scene_answers_in_the_daemon_as_the_full_one() -> None:
+    tolerance, ticks = 0.05, 1500
+    full = load(directory("config") / "every-term.toml")
+    scene = study(full, 1.5, tolerance, lambda _: None)
+    exact = play(full, 1.5)
+    off = worst_j = last_n = depth_m = 0.0
+    seen = 0
+    with Daemon(scene.minimal.text) as daemon, Subscriber(daemon.wait_ready().endpoint) as subscriber:
+        for topic, fields in subscriber.maps():
+            seq = fields["seq"]
+            if seq >= ticks:
+                break
+            if topic == "hapticd/position":
+                off += (fields["force_n"][0] - exact.force_n[seq]) ** 2
+                last_n, depth_m = fields["force_n"][0], -fields["position_m"][0]
+                seen += 1
+            if topic == "hapticd/energy":
+                worst_j = max(worst_j, abs(fields["energy_j"] - exact.energy_j[seq]))
+    size = sum(force_n * force_n for force_n in exact.force_n)
+    assert seen > ticks // 2
+    assert 0.0 < math.sqrt(off / size) <= tolerance
+    assert 0.0 < worst_j <= tolerance * max(map(abs, exact.energy_j))
+    assert last_n / depth_m == pytest.approx(exact.displayed_n_per_m, rel=tolerance)
+    assert scene.minimal_operations < 0.7 * scene.operations

@@ -1,0 +1,213 @@
+"""A file that is saved, in every way that editors and orchestrators have, is taken over where it says so itself."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hapticd.config.loading import LoadedConfig
+from hapticd.contracts.errors import ConfigError
+from hapticd.contracts.event import EventCode
+from hapticd.supervisor.watcher import LOOK_S, QUIET_S, FileWatcher, steps_to
+from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
+from tests.daemon.test_deaths import PRESSED, pressing
+
+OLD = '[controller]\nlaw = "none"\n'
+NEW = '[controller]\nlaw = "tdpa"\n'
+BAD = '[controller]\nlaw = "tdap"\n'
+
+
+@contextmanager
+def watched(path: Path) -> Iterator[FileWatcher]:
+    watcher = FileWatcher(path, path.read_text())
+    try:
+        yield watcher
+    finally:
+        watcher.close()
+
+
+def found(watcher: FileWatcher) -> LoadedConfig | ConfigError:
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        saved = watcher.take()
+        if saved is not None:
+            return saved
+        time.sleep(0.01)
+    raise AssertionError("nobody saw that the file was saved")
+
+
+def law_in(watcher: FileWatcher) -> str:
+    saved = found(watcher)
+    assert isinstance(saved, LoadedConfig), saved
+    return saved.config.controller.law
+
+
+def in_place(file: Path, text: str) -> None:
+    file.write_text(text)
+
+
+def renamed_over(file: Path, text: str) -> None:
+    new = file.with_name(f".{file.name}.new")
+    new.write_text(text)
+    new.replace(file)
+
+
+def moved_away_first(file: Path, text: str) -> None:
+    """As vim does with `backup`: for a moment there is no file."""
+    file.rename(f"{file}~")
+    file.write_text(text)
+    Path(f"{file}~").unlink()
+
+
+def in_pieces(file: Path, text: str) -> None:
+    """Truncated first, written by and by, each piece a usable file or none."""
+    with file.open("w") as open_file:
+        for letter in text:
+            open_file.write(letter)
+            open_file.flush()
+            time.sleep(0.005)
+
+
+def with_its_directory(file: Path, text: str) -> None:
+    """The whole directory is exchanged, as a package manager or `rsync` into a new tree does."""
+    new, old = file.parent.with_name("new"), file.parent.with_name("old")
+    new.mkdir()
+    (new / file.name).write_text(text)
+    file.parent.rename(old)
+    new.rename(file.parent)
+    shutil.rmtree(old)
+
+
+SAVES = [in_place, renamed_over, moved_away_first, with_its_directory]
+
+
+@pytest.mark.parametrize("save", SAVES)
+def test_however_it_is_saved_it_is_seen_once_and_whole(tmp_path: Path, save: Callable[[Path, str], None]) -> None:
+    file = tmp_path / "etc" / "lab.toml"
+    file.parent.mkdir()
+    file.write_text(OLD)
+    with watched(file) as watcher:
+        for _ in range(2):  # what replaced it is watched as well
+            save(file, NEW)
+            assert law_in(watcher) == "tdpa"
+            save(file, OLD)
+            assert law_in(watcher) == "none"
+
+
+def test_a_file_that_is_written_in_pieces_is_seen_whole_in_the_end(tmp_path: Path) -> None:
+    """On a computer that is busy enough a piece may be seen first; it is not the last word."""
+    file = tmp_path / "lab.toml"
+    file.write_text(OLD)
+    with watched(file) as watcher:
+        in_pieces(file, NEW)
+        for _ in NEW:
+            saved = found(watcher)
+            if isinstance(saved, LoadedConfig) and saved.text == NEW:
+                return
+        raise AssertionError("the last piece was never seen")
+
+
+def test_a_link_that_is_turned_on_the_way_to_the_file_is_a_save(tmp_path: Path) -> None:
+    """lab.toml -> ..data/lab.toml, ..data -> ..1/, which is how Kubernetes exchanges all files of a volume at once."""
+    volume = tmp_path / "volume"
+    for generation, text in (("..1", OLD), ("..2", NEW), ("..3", OLD)):
+        (volume / generation).mkdir(parents=True)
+        (volume / generation / "lab.toml").write_text(text)
+    (volume / "..data").symlink_to("..1")
+    file = volume / "lab.toml"
+    file.symlink_to("..data/lab.toml")
+    with watched(file) as watcher:
+        for generation, law in (("..2", "tdpa"), ("..3", "none")):
+            (volume / "..new").symlink_to(generation)
+            (volume / "..new").replace(volume / "..data")
+            assert law_in(watcher) == law
+
+
+def test_a_file_elsewhere_that_a_link_leads_to_is_watched_there(tmp_path: Path) -> None:
+    real = tmp_path / "store" / "real.toml"
+    real.parent.mkdir()
+    real.write_text(OLD)
+    file = tmp_path / "lab.toml"
+    file.symlink_to(real)
+    with watched(file) as watcher:
+        renamed_over(real, NEW)
+        assert law_in(watcher) == "tdpa"
+
+
+def test_a_file_that_cannot_be_used_is_told_with_the_reason_and_the_next_save_is_seen(tmp_path: Path) -> None:
+    file = tmp_path / "lab.toml"
+    file.write_text(OLD)
+    with watched(file) as watcher:
+        file.write_text(BAD)
+        refused = found(watcher)
+        assert isinstance(refused, ConfigError)
+        assert 'controller.law = "tdap"' in str(refused)
+        file.write_bytes(b"\xff")
+        assert "UTF-8" in str(found(watcher))
+        file.write_text(NEW)
+        assert law_in(watcher) == "tdpa"
+
+
+def test_what_says_the_same_is_no_save_and_neither_is_a_file_that_is_empty_or_away(tmp_path: Path) -> None:
+    """An emptied file would be a usable configuration, without a wall: it is one that somebody is about to write."""
+    file = tmp_path / "lab.toml"
+    file.write_text(OLD)
+    with watched(file) as watcher:
+        os.utime(file)
+        file.write_text("")
+        time.sleep(2.0 * (QUIET_S + LOOK_S))
+        file.unlink()
+        time.sleep(2.0 * (QUIET_S + LOOK_S))
+        file.write_text(OLD)
+        (tmp_path / "other.toml").write_text(NEW)
+        time.sleep(2.0 * (QUIET_S + LOOK_S))
+        assert watcher.take() is None
+        file.write_text(NEW)
+        assert law_in(watcher) == "tdpa"
+
+
+def test_the_way_to_a_file_names_every_link_and_ends_in_circles(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").symlink_to("a")
+    (tmp_path / "a" / "x.toml").symlink_to("../b/../b/y.toml")
+    (tmp_path / "a" / "round.toml").symlink_to("round.toml")
+    root = tmp_path.resolve()
+    steps = [str(step.relative_to(root)) for step in steps_to(root / "b" / "x.toml") if step.is_relative_to(root)]
+    assert [step for step in steps if step != "."] == ["b", "a", "a/x.toml", "b", "a", "b", "a", "a/y.toml"]
+    assert len(steps_to(root / "a" / "round.toml")) < 100
+
+
+def test_a_daemon_takes_over_what_is_saved_for_as_long_as_the_file_says_so() -> None:
+    on = "[service]\nreload_on_save = true\n"
+    with Daemon(PRESSED + on).wait_ready() as daemon, Subscriber(daemon.endpoint) as subscriber:
+        pressing(daemon)
+        first = subscriber.until("hapticd/status")["config_hash"]
+        renamed_over(daemon.config, PRESSED + on + BAD)
+        refused = subscriber.until("hapticd/event", code=EventCode.REFUSED)
+        assert "tdap" in refused["text"]
+        assert subscriber.until("hapticd/status")["config_hash"] == first
+
+        renamed_over(daemon.config, PRESSED + on + NEW)
+        switched = subscriber.until("hapticd/event", code=EventCode.SWITCHED)
+        assert (switched["law_before"], switched["law"]) == ("energy-cycle", "tdpa")
+
+        in_place(daemon.config, PRESSED + NEW)  # takes itself over, and then no more
+        assert subscriber.until("hapticd/event", code=EventCode.SWITCHED)["law"] == "tdpa"
+        in_place(daemon.config, PRESSED + OLD)
+        time.sleep(2.0 * (QUIET_S + LOOK_S))
+        with Subscriber(daemon.endpoint, "hapticd/status") as late:
+            assert late.until("hapticd/status")["law"] == "tdpa"
+        daemon.process.terminate()
+        assert daemon.wait_exit() == 0
+
+
+def test_a_daemon_that_looks_at_its_file_ends_as_any_other() -> None:
+    with Daemon(PRESSED + "[service]\nreload_on_save = true\n").wait_ready() as daemon:
+        daemon.process.terminate()
+        assert daemon.wait_exit() == 0
