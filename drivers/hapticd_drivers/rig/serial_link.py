@@ -1,0 +1,167 @@
+"""A serial line as a link: opened by pyserial, then read and written directly, since a tick must never wait.
+
+pyserial's own `write` tries again and again while the line takes no more, even when told not to wait.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import select
+import termios
+from pathlib import Path
+
+import serial
+
+from hapticd.contracts.errors import (
+    DeviceBusyError,
+    DeviceDisconnectedError,
+    DeviceNotFoundError,
+    DevicePermissionError,
+    DriverError,
+)
+from hapticd_drivers.rig.frames import FrameReader, framed
+from hapticd_drivers.rig.serial_ports import Port, latency_timer
+
+MOST_BYTES = 4096
+"""Most that is read at once: more than a line brings in 10 ms."""
+
+
+class SerialLink:
+    """Frames on a serial line; a `link.Link`.
+
+    Args:
+        port: what to open.
+        baud: bits a second.
+        low_latency: ask the kernel and the adapter not to keep bytes back.
+
+    Raises:
+        DriverError: not there, not permitted, or busy.
+    """
+
+    def __init__(self, port: Port, baud: int, low_latency: bool) -> None:
+        self.where = port.path
+        self._unsent = 0
+        self._reader = FrameReader()
+        self._rest = b""  # of a frame that has gone out in part
+        self._port = _opened(port, baud)
+        self._descriptor: int = self._port.fileno()
+        _keep_up(self._descriptor)
+        self.notes = _hurry(self._port) if low_latency else ()
+
+    @property
+    def damaged(self) -> int:
+        """Frames so far that were no message."""
+        return self._reader.damaged
+
+    @property
+    def unsent(self) -> int:
+        """Messages so far that were dropped because the line could take no more."""
+        return self._unsent
+
+    def send(self, message: bytes) -> None:
+        """Send a message, or drop it when the line can take no more."""
+        if self._rest:
+            self._rest = self._rest[self._write(self._rest) :]
+            if self._rest:
+                self._unsent += 1
+                return
+        frame = framed(message)
+        written = self._write(frame)
+        if written == 0:
+            self._unsent += 1
+        elif written < len(frame):
+            self._rest = frame[written:]
+
+    def receive(self) -> list[bytes]:
+        """The intact messages that have come."""
+        try:
+            data = os.read(self._descriptor, MOST_BYTES)
+        except BlockingIOError:
+            return []
+        except OSError as error:
+            raise self._gone(error) from None
+        return self._reader.feed(data) if data else []
+
+    def wait(self, timeout_s: float) -> None:
+        """Return when something may have come, or after so long [s]."""
+        select.select([self._descriptor], [], [], timeout_s)
+
+    def close(self) -> None:
+        """Give it back."""
+        with contextlib.suppress(OSError, serial.SerialException):
+            self._port.close()
+
+    def _write(self, data: bytes) -> int:
+        try:
+            return os.write(self._descriptor, data)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise self._gone(error) from None
+
+    def _gone(self, error: OSError) -> DeviceDisconnectedError:
+        return DeviceDisconnectedError(f"serial-rig: {self.where} is gone, unplugged perhaps ({error.strerror})")
+
+
+def _opened(port: Port, baud: int) -> serial.Serial:
+    try:
+        return serial.Serial(port.path, baud, timeout=0, write_timeout=0, exclusive=True)
+    except (serial.SerialException, OSError, ValueError, termios.error) as error:
+        raise _refusal(port, baud, error) from error
+
+
+def _refusal(port: Port, baud: int, error: Exception) -> DriverError:
+    number = getattr(error, "errno", None)
+    if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
+        return DeviceNotFoundError(f"serial-rig: there is no {port.path}: is the rig plugged in?")
+    if number in (errno.EACCES, errno.EPERM):
+        return DevicePermissionError(
+            f"serial-rig: this user may not open {port.path}: sudo usermod -aG dialout $USER, then log in again"
+        )
+    if number in (errno.EAGAIN, errno.EBUSY):
+        return DeviceBusyError(
+            f"serial-rig: another program has {port.path} open: end it first (sudo fuser -v {port.path} names it)"
+        )
+    return DeviceNotFoundError(f"serial-rig: {port.path} cannot be opened at {baud} baud: {error}")
+
+
+def _keep_up(descriptor: int) -> None:
+    """Leave DTR up when the port is closed: the next to open it does not reset the board then."""
+    with contextlib.suppress(termios.error):
+        attributes = termios.tcgetattr(descriptor)
+        attributes[2] &= ~termios.HUPCL
+        termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+
+
+def _hurry(port: serial.Serial) -> tuple[str, ...]:
+    """Ask that no bytes are kept back; what to know when that cannot be had."""
+    refused = ""
+    try:
+        port.set_low_latency_mode(True)
+    except ValueError as error:
+        refused = str(error)
+    timer = latency_timer(port.port)
+    try:
+        if timer.read_text().strip() == "1":
+            return ()
+        timer.write_text("1")
+        return ()
+    except FileNotFoundError:  # no FTDI adapter
+        if refused:
+            return (
+                f"serial-rig: {port.port} has no low-latency mode: round_trip_us in the status says what that costs",
+            )
+        return ()
+    except OSError:
+        return (
+            f"serial-rig: the adapter at {port.port} keeps bytes back for {_shown(timer)} ms: "
+            f"echo 1 | sudo tee {timer}, or the udev rule in docs/serial-rig.md",
+        )
+
+
+def _shown(timer: Path) -> str:
+    with contextlib.suppress(OSError):
+        return timer.read_text().strip()
+    return "up to 255"

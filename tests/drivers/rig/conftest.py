@@ -1,0 +1,40 @@
+"""The protocol core and the AVR firmware, each built once a session; each test has a rig of its own."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hapticd_drivers.rig import conversation
+from tests.drivers.rig.device import PATIENCE_S, Rig, build
+from tests.firmware.board import Board, Built
+from tests.firmware.board import build as build_board
+
+
+@pytest.fixture(scope="session")
+def rig_core(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    return build(tmp_path_factory.mktemp("core"))
+
+
+@pytest.fixture
+def rig(rig_core: ctypes.CDLL, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
+    """A rig in this process; nothing is urgent here, since a busy computer must not look like a silent rig."""
+    monkeypatch.setattr(conversation, "PATIENCE_S", PATIENCE_S)
+    monkeypatch.setattr(conversation, "URGENT_PATIENCE_S", PATIENCE_S)
+    with Rig(rig_core, tmp_path / "port") as made:
+        yield made
+
+
+@pytest.fixture(scope="session")
+def board_parts(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    return build_board(tmp_path_factory.mktemp("board"))
+
+
+@pytest.fixture
+def board(board_parts: Built, tmp_path: Path) -> Iterator[Board]:
+    """The AVR firmware on a simulated processor; a frame from here is a millisecond there."""
+    with Board(board_parts, tmp_path / "board", pace="frames") as made:
+        yield made

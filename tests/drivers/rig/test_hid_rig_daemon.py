@@ -1,0 +1,188 @@
+"""The whole daemon on a rig on USB that is not there, judged from its telemetry and from what the rig does."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections import deque
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from hapticd.contracts.event import EventCode
+from tests.daemon.running import HAPTICD, Daemon, Subscriber, wait_until
+from tests.daemon.test_commands import ask
+from tests.drivers.rig.hid_bench import SERIAL, HidDouble, build
+
+STIFFNESS_N_PER_M = 500.0
+PRESS_N = 2.0
+DEPTH_M = PRESS_N / STIFFNESS_N_PER_M
+START_M = 0.002
+"""Above the wall, at rest until the hand pushes."""
+
+STALLED_TICKS = 50
+HELD_TICKS = 300
+LONGEST_TICKS = 10_000
+ATTEMPTS = 5
+PRESS_S = 10.0
+BUSY = {EventCode.LOOP_LATE, EventCode.DEVICE_FROZEN, EventCode.DEVICE_LOST}
+"""What this computer brings about when it has no time for the loop or for the rig's double."""
+
+CONFIG = f"""
+[loop]
+rate_hz = 1000.0
+law_budget = 1.0
+[device]
+driver = "hid-rig"
+[device.options]
+sign_checked = true
+[[scene.walls]]
+axis = "x"
+free_side = "positive"
+stiffness_n_per_m = {STIFFNESS_N_PER_M}
+[controller]
+law = "energy-cycle"
+[safety]
+auto_arm = true
+"""
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("double"))
+
+
+@pytest.fixture
+def double(program: Path) -> Iterator[HidDouble]:
+    made = HidDouble(program)
+    made.set("x_m", START_M)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def daemon(double: HidDouble) -> Iterator[Daemon]:
+    environment = [f"{name}={value}" for name, value in double.environment.items()]
+    with Daemon(CONFIG, prefix=["env", *environment]) as running:
+        yield running.wait_ready()
+
+
+def press(double: HidDouble, daemon: Daemon) -> None:
+    """Push the handle into the wall; again when this computer was so busy that the loop has let go of it."""
+    for _ in range(ATTEMPTS):
+        double.set("hand_n", -PRESS_N)
+        end_s = time.monotonic() + PRESS_S
+        while time.monotonic() < end_s:
+            if double.look().force_un > 0.5e6 * PRESS_N:
+                return
+            time.sleep(0.005)
+        let_go_and_arm(double, daemon)
+    raise AssertionError(f"the wall did not push in {ATTEMPTS} attempts: {daemon.output()}")
+
+
+def let_go_and_arm(double: HidDouble, daemon: Daemon) -> None:
+    double.set("hand_n", 0.0)
+    double.set("x_m", START_M)
+    for word in ("clear", "arm"):
+        wait_until(lambda: ask(daemon, word).returncode == 0, word)  # noqa: B023 - called before the next word
+
+
+def ticks_of(subscriber: Subscriber, faults: list[int]) -> Iterator[tuple[int, float]]:
+    """Number and position [m] of each tick that is published; faults before it are noted."""
+    for topic, fields in subscriber.maps():
+        if topic == "hapticd/event" and 200 <= fields["code"] < 300:
+            faults.append(fields["code"])
+        if topic == "hapticd/position":
+            yield fields["seq"], fields["position_m"][0]
+    raise AssertionError("no ticks any more")
+
+
+def test_a_wall_holds_the_hand_and_the_rig_agrees_where(double: HidDouble, daemon: Daemon) -> None:
+    """Without the wall the hand would have the handle at the end of its travel, 49.5 mm below."""
+    held: deque[float] = deque(maxlen=HELD_TICKS)
+    for _ in range(ATTEMPTS):
+        press(double, daemon)
+        faults: list[int] = []
+        with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event") as subscriber:
+            for _, position_m in islice(ticks_of(subscriber, faults), LONGEST_TICKS):
+                held.append(position_m)
+                still = len(held) == HELD_TICKS and max(held) - min(held) < 2e-4
+                if still and min(held) == pytest.approx(-DEPTH_M, rel=0.1):
+                    look = double.look()
+                    assert look.x_m == pytest.approx(-DEPTH_M, rel=0.15)
+                    assert look.force_un == pytest.approx(1e6 * PRESS_N, rel=0.15)
+                    return
+                if faults:
+                    break
+        assert set(faults) <= BUSY, f"{min(held)} to {max(held)} m: {daemon.output()}"
+        let_go_and_arm(double, daemon)
+    raise AssertionError(f"the wall did not hold: {min(held)} to {max(held)} m: {daemon.output()}")
+
+
+def test_a_write_that_stalls_costs_the_loop_no_tick_and_the_rig_its_force(double: HidDouble, daemon: Daemon) -> None:
+    """The loop ticks on, sees that nothing new comes from the rig, and lets go; it takes a user to go on."""
+    press(double, daemon)
+    with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is connected
+        double.tell("hold")
+        held = double.look().sequence
+        faults: list[int] = []
+        ticks = ticks_of(subscriber, faults)
+        for _ in range(STALLED_TICKS):
+            next(ticks)
+        assert double.look().sequence == held, "the write was not held"
+        double.set("hand_n", 0.0)
+        double.tell("release")
+        while not faults:
+            next(ticks)
+        assert set(faults) <= {EventCode.DEVICE_FROZEN, EventCode.DEVICE_LOST, EventCode.LOOP_LATE}
+    wait_until(lambda: double.look().force_un == 0, "the rig to be without force")
+    let_go_and_arm(double, daemon)
+    press(double, daemon)
+
+
+def test_an_unplugged_rig_is_lost_and_comes_back_with_its_wall(double: HidDouble, daemon: Daemon) -> None:
+    press(double, daemon)
+    with Subscriber(daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is connected
+        double.tell("unplug")
+        lost = subscriber.until("hapticd/event", code=EventCode.DEVICE_LOST)
+        assert "/dev/hidraw0 is gone" in lost["text"]
+        double.set("hand_n", 0.0)
+        double.set("x_m", START_M)
+        double.plug()
+        subscriber.until("hapticd/event", code=EventCode.DEVICE_FOUND)
+    press(double, daemon)
+
+
+def test_sigterm_leaves_the_rig_without_force(double: HidDouble, daemon: Daemon) -> None:
+    press(double, daemon)
+    daemon.process.terminate()
+    assert daemon.wait_exit() == 0
+    assert double.look().force_un == 0
+
+
+def test_a_loop_that_is_killed_leaves_the_rig_without_force(double: HidDouble, daemon: Daemon) -> None:
+    """Its watchdog is far away here: it is the supervisor's helper that says hello to it and so takes the force."""
+    press(double, daemon)
+    os.kill(daemon.control_pid(), signal.SIGKILL)
+    assert daemon.wait_exit() == 1
+    assert double.look().force_un == 0
+    assert "the device is without force" in daemon.output()
+
+
+def test_a_user_finds_the_rig(double: HidDouble) -> None:
+    listed = subprocess.run(
+        [HAPTICD, "devices", "hid-rig"],
+        env={**os.environ, **double.environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "host-rig" in listed.stdout
+    assert SERIAL in listed.stdout
+    assert "/dev/hidraw0" in listed.stdout

@@ -1,0 +1,180 @@
+"""What a calibration does to a handle, whatever the handle does: force, way and time are bounded."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticd.contracts.errors import DeviceFaultError
+from hapticd_drivers.rig import motion
+from hapticd_drivers.rig.motion import Drive, Moment
+
+COUNT_M = 1e-5
+BOUND_N = 0.5
+
+
+class Handle:
+    """A handle in simulated time, that remembers what was done to it.
+
+    Args:
+        stops_m: ends of its travel; at rest at 0.
+        motor: what it does with 1 N.
+        hand_n: constant force on it.
+        switch_m: its switch is closed below.
+    """
+
+    def __init__(
+        self,
+        stops_m: tuple[float, float] = (-0.03, 0.05),
+        motor: float = 1.0,
+        hand_n: float = 0.0,
+        switch_m: float = -math.inf,
+    ) -> None:
+        self.stops_m = stops_m
+        self.motor = motor
+        self.hand_n = hand_n
+        self.switch_m = switch_m
+        self.time_s = 0.0
+        self.position_m = 0.0
+        self.speed_m_per_s = 0.0
+        self.forces_n: list[float] = []
+        self.fastest_m_per_s = 0.0
+
+    def push(self, axis: int, force_n: float) -> Moment:
+        assert axis == 0
+        self.forces_n.append(force_n)
+        for _ in range(10):
+            push_n = self.motor * force_n + self.hand_n
+            friction_n = 0.03 if (self.speed_m_per_s or push_n) > 0.0 else -0.03
+            if self.speed_m_per_s or abs(push_n) > 0.03:
+                after = self.speed_m_per_s + (push_n - friction_n - self.speed_m_per_s) / 0.1 * 1e-4
+                self.speed_m_per_s = 0.0 if self.speed_m_per_s * after < 0.0 else after
+            self.position_m += self.speed_m_per_s * 1e-4
+            if not self.stops_m[0] < self.position_m < self.stops_m[1]:
+                self.position_m = max(self.stops_m[0], min(self.stops_m[1], self.position_m))
+                self.speed_m_per_s = 0.0
+            self.time_s += 1e-4
+        self.fastest_m_per_s = max(self.fastest_m_per_s, abs(self.speed_m_per_s))
+        counts = round(self.position_m / COUNT_M)
+        return Moment(self.time_s, counts * COUNT_M, counts, self.position_m < self.switch_m)
+
+
+def drive_of(handle: motion.Mover, span_m: float = 0.08) -> Drive:
+    return Drive(
+        handle,
+        0,
+        "x",
+        force_n=BOUND_N,
+        speed_m_per_s=0.02,
+        damping_n_s_per_m=5.0,
+        count_m=COUNT_M,
+        span_m=span_m,
+    )
+
+
+def test_a_motor_that_is_right_passes_after_a_millimetre() -> None:
+    handle = Handle()
+    motion.check_sign(drive_of(handle))
+    assert abs(handle.position_m) < 2e-3
+    assert handle.forces_n[-1] == 0.0
+
+
+@pytest.mark.parametrize("towards", [-1.0, 1.0])
+@pytest.mark.parametrize("starts_m", [-0.03, 0.0, 0.05])
+def test_an_end_is_found_from_wherever_the_handle_stands(towards: float, starts_m: float) -> None:
+    handle = Handle()
+    handle.position_m = starts_m
+    found = motion.find_stop(drive_of(handle), towards) * COUNT_M
+    assert found == pytest.approx(handle.stops_m[towards > 0.0], abs=2 * COUNT_M)
+    assert handle.fastest_m_per_s < 4 * 0.02
+
+
+@pytest.mark.parametrize("starts_m", [-0.025, -0.01, 0.03])
+def test_a_switch_is_found_from_both_sides_of_it(starts_m: float) -> None:
+    handle = Handle(switch_m=-0.02)
+    handle.position_m = starts_m
+    assert motion.find_switch(drive_of(handle), -1.0) * COUNT_M == pytest.approx(-0.02, abs=1e-4)
+
+
+def test_a_handle_without_an_end_is_not_driven_for_ever() -> None:
+    handle = Handle(stops_m=(-10.0, 10.0))
+    with pytest.raises(DeviceFaultError, match="found no end"):
+        motion.find_stop(drive_of(handle), -1.0)
+    assert abs(handle.position_m) < 2.0 * 0.08
+    assert handle.forces_n[-1] == 0.0
+
+
+def test_a_reversed_motor_in_a_drive_ends_by_its_speed() -> None:
+    """A drive comes after the check of the sign; a wire that comes loose in between must not turn it into a throw."""
+    handle = Handle(motor=-1.0)
+    with pytest.raises(DeviceFaultError, match="as fast as it should"):
+        motion.find_stop(drive_of(handle), -1.0)
+    assert handle.fastest_m_per_s < 3 * motion.FAST * 0.02
+    assert handle.forces_n[-1] == 0.0
+
+
+def test_a_place_where_the_handle_sticks_is_not_taken_for_the_end() -> None:
+    """It is held up half-way at first, and goes on at the second try."""
+    handle = Handle()
+    handle.stops_m = (-0.01, 0.05)
+    push = handle.push
+
+    def freed(axis: int, force_n: float) -> Moment:
+        now = push(axis, force_n)
+        if handle.time_s > 1.5:
+            handle.stops_m = (-0.03, 0.05)
+        return now
+
+    handle.push = freed  # type: ignore[method-assign]  # changes its stops on the way
+    with pytest.raises(DeviceFaultError, match="two places"):
+        motion.find_stop(drive_of(handle), -1.0)
+
+
+class Mad:
+    """A handle that is wherever it likes, on a clock that runs as it likes, but runs.
+
+    Args:
+        way: positions [counts] and steps of time [ms], again and again.
+    """
+
+    def __init__(self, way: list[tuple[int, int, bool]]) -> None:
+        self.way = way
+        self.forces_n: list[float] = []
+        self.time_s = 0.0
+
+    def push(self, axis: int, force_n: float) -> Moment:
+        counts, step_ms, switch = self.way[len(self.forces_n) % len(self.way)]
+        self.forces_n.append(force_n)
+        self.time_s += 1e-3 * step_ms
+        return Moment(self.time_s, counts * COUNT_M, counts, switch)
+
+
+@given(
+    way=st.lists(
+        st.tuples(st.integers(-(2**31), 2**31 - 1) | st.integers(-100, 100), st.integers(5, 500), st.booleans()),
+        min_size=1,
+        max_size=30,
+    ),
+    routine=st.sampled_from(["check_sign", "find_stop", "find_switch", "here"]),
+)
+def test_whatever_a_handle_does_the_force_is_bounded_and_ends(way: list[tuple[int, int, bool]], routine: str) -> None:
+    handle = Mad(way)
+    drive = drive_of(handle)
+    try:
+        match routine:
+            case "check_sign":
+                motion.check_sign(drive)
+            case "find_stop":
+                motion.find_stop(drive, -1.0)
+            case "find_switch":
+                motion.find_switch(drive, 1.0)
+            case "here":
+                motion.here(drive)
+    except DeviceFaultError:
+        pass
+    assert all(abs(force_n) <= BOUND_N for force_n in handle.forces_n)
+    assert handle.forces_n[-1] == 0.0
+    assert handle.time_s < 300.0

@@ -1,0 +1,224 @@
+"""The whole daemon on the AVR firmware: machine code on a simulated processor, a handle behind its pins, a real pty.
+
+Protocol and safety are shown here, latency is not: a millisecond of the rig is a frame of the daemon's.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import msgpack
+import pytest
+import zmq
+
+from hapticd.contracts.event import EventCode
+from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
+from tests.firmware.board import Board
+
+WALL_M = -0.01
+STIFFNESS_N_PER_M = 2000.0
+PRESS_N = 2.0
+HELD_M = 0.02
+
+ATTEMPTS = 5
+"""A computer that is too busy may miss so many deadlines that the loop lets go, or starve the simulated processor until
+it looks lost: that tells nothing of the driver."""
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def config(board: Board, homing: str) -> str:
+    return f"""
+        [loop]
+        law_budget = 1.0
+        realtime = "off"
+        [device]
+        driver = "serial-rig"
+        [device.options]
+        port = "{board.port}"
+        calibration_speed_m_per_s = 0.2
+        [[device.options.axes]]
+        homing = "{homing}"
+        [[scene.walls]]
+        position_m = {WALL_M}
+        stiffness_n_per_m = {STIFFNESS_N_PER_M}
+    """
+
+
+class Lab:
+    """A daemon on a board, and its control socket.
+
+    Args:
+        board: the rig; a hand holds its handle at `HELD_M`.
+        homing: how it is calibrated; for "here", positions count from there.
+    """
+
+    def __init__(self, board: Board, homing: str = "here") -> None:
+        self.board = board
+        self.zero_m = HELD_M if homing == "here" else 0.0
+        self.daemon = Daemon(config(board, homing))
+        self._context = zmq.Context()
+        self._socket = self._context.socket(zmq.DEALER)
+
+    def __enter__(self) -> Lab:
+        self.daemon.wait_ready()
+        self._socket.connect(f"ipc://{self.daemon.directory}/run/default/control")
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._socket.close(0)
+        self._context.term()
+        self.daemon.__exit__(*exception)
+
+    def ask(self, do: str) -> str:
+        """What the daemon refuses a command with; "" when it obeys."""
+        self._socket.send(msgpack.packb({"do": do}))
+        assert self._socket.poll(int(4e3 * PATIENCE_S)), f"no answer to {do}"
+        answer = msgpack.unpackb(self._socket.recv())
+        return "" if answer["ok"] else str(answer["text"])
+
+    def press(self) -> Lab:
+        """Calibrate, arm, and let a hand press the handle into the wall; anew where this computer was too busy."""
+        said = []
+        end_s = time.monotonic() + 4.0 * PATIENCE_S
+        while time.monotonic() < end_s:
+            self.board.hand(0.0)
+            self._hold()
+            if self.zero_m == 0.0:
+                self.board.grip(0.0, 0.0, 0.0)  # it drives the handle
+            said.append(self.ask("calibrate"))
+            if not said[-1]:
+                self._hold()
+                said.append(self.ask("arm"))
+                if "hapticd clear" in said[-1]:
+                    self.ask("clear")
+                    said.append(self.ask("arm"))
+                if not said[-1]:
+                    self.board.grip(0.0, 2.0, 0.0)
+                    self.board.hand(-PRESS_N)
+                    if self._pushes():
+                        return self
+            time.sleep(1.0)
+        raise AssertionError(f"the wall never pushed: {said}, {self.daemon.output()}")
+
+    def _hold(self) -> None:
+        self.board.grip(100.0, 5.0, HELD_M)
+        wait_until(lambda: abs(self.board.state().position_m - HELD_M) < 0.002, "the hand to hold the handle")
+
+    def _pushes(self) -> bool:
+        """Whether the wall pushes back before the hand has reached the stop."""
+        while True:
+            state = self.board.state()
+            if state.motor_n > 0.5 * PRESS_N:
+                return True
+            if state.position_m < -0.049:
+                return False
+            time.sleep(0.01)
+
+    def held(self, positions: Iterator[float]) -> bool:
+        """Whether the handle comes to rest, for half a second, where hand and wall are in balance."""
+        depth_m = PRESS_N / STIFFNESS_N_PER_M
+        still = 0
+        for position_m in itertools.islice(positions, 10_000):
+            still = still + 1 if abs(position_m - (WALL_M - depth_m)) < 0.1 * depth_m else 0
+            if still == 500:
+                return True
+        return False
+
+
+def until(subscriber: Subscriber, code: EventCode, text: str) -> None:
+    """Return when this event has come with this text."""
+    while text not in subscriber.until("hapticd/event", code=code)["text"]:
+        pass
+
+
+@pytest.fixture
+def lab(board: Board) -> Iterator[Lab]:
+    board.place(HELD_M)
+    with Lab(board) as made:
+        yield made
+
+
+@pytest.fixture
+def homing_lab(board: Board) -> Iterator[Lab]:
+    """Its handle stands near the home switch, which is at the lower end."""
+    board.place(-0.04)
+    with Lab(board, "low_switch") as made:
+        yield made
+
+
+def test_a_rig_is_identified_homed_enabled_and_holds_a_wall(homing_lab: Lab) -> None:
+    lab = homing_lab
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status", "hapticd/position") as subscriber:
+        status = subscriber.until("hapticd/status")
+        assert (status["device"], status["serial"], status["armed"]) == ("serial-rig", "0001", False)
+        assert not status["calibrated"]
+        assert any("no low-latency mode" in warning for warning in status["warnings"])
+        assert "hapticd calibrate" in lab.ask("arm")
+
+        positions = (fields["position_m"][0] for topic, fields in subscriber.maps() if topic == "hapticd/position")
+        assert any(lab.press().held(positions) for _ in range(ATTEMPTS))
+        assert lab.board.state().position_m == pytest.approx(WALL_M - PRESS_N / STIFFNESS_N_PER_M, abs=3e-4)
+        assert lab.board.state().motor_n == pytest.approx(PRESS_N, rel=0.2)
+        status = subscriber.until("hapticd/status")
+        assert status["calibrated"]
+        metrics = status["device_metrics"]
+        assert 0.0 < metrics["echo_us"] <= metrics["longest_echo_us"]
+        assert metrics["round_trip_us"] > 0.0
+    lab.daemon.process.terminate()
+    assert lab.daemon.wait_exit() == 0
+    assert lab.board.state().motor_n == 0.0
+
+
+def test_when_the_daemon_is_stopped_the_rig_lets_go_and_takes_no_force_until_it_is_enabled_anew(lab: Lab) -> None:
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is connected
+        control = lab.press().daemon.control_pid()
+        os.kill(lab.daemon.process.pid, signal.SIGSTOP)
+        os.kill(control, signal.SIGSTOP)
+        wait_until(lambda: lab.board.state().motor_n == 0.0, "the rig's watchdog")
+        lab.board.hand(0.0)
+        os.kill(control, signal.SIGCONT)
+        os.kill(lab.daemon.process.pid, signal.SIGCONT)
+        until(subscriber, EventCode.DEVICE_FAULT, "watchdog heard no command for 20 ms")
+        subscriber.until("hapticd/event", code=EventCode.DEVICE_FOUND)
+        assert lab.board.state().motor_n == 0.0
+        assert "hapticd clear" in lab.ask("arm")
+        assert lab.ask("clear") == ""
+        assert "pushes the right way" in lab.ask("arm")
+        lab.press()
+
+
+def test_a_killed_loop_leaves_no_force(lab: Lab) -> None:
+    os.kill(lab.press().daemon.control_pid(), signal.SIGKILL)
+    assert lab.daemon.wait_exit() == 1
+    assert lab.board.state().motor_n == 0.0
+    assert "the device is without force" in lab.daemon.output()
+
+
+def test_a_rig_whose_cable_is_pulled_comes_back_and_has_to_be_calibrated(lab: Lab) -> None:
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is connected
+        lab.press().board.hand(0.0)
+        lab.board.unplug()
+        until(subscriber, EventCode.DEVICE_LOST, "is gone")
+        lab.board.plug()
+        subscriber.until("hapticd/event", code=EventCode.DEVICE_FOUND)
+        assert "hapticd calibrate" in lab.ask("arm")
+        lab.press()
+
+
+def test_a_reversed_motor_never_gets_to_push_a_wall(lab: Lab) -> None:
+    lab.board.reverse_motor(True)
+    before_m = lab.board.state().position_m
+    end_s = time.monotonic() + 4.0 * PATIENCE_S
+    while "motor_reversed" not in lab.ask("calibrate"):
+        assert time.monotonic() < end_s
+        time.sleep(0.2)
+    assert abs(lab.board.state().position_m - before_m) < 5e-3
+    assert "hapticd calibrate" in lab.ask("arm")
+    assert lab.board.state().motor_n == 0.0
