@@ -81,7 +81,9 @@ class Fit:
         """Why this model, in a line."""
         what = f"{self.options.integrator} step" + (f" without {', '.join(self.omitted)}" if self.omitted else "")
         if not self.omitted and self.options.integrator == "exact":
-            return f"{what} of every term: none of {self.rehearsed - 1} cheaper ones keeps the errors asked for"
+            tried = self.rehearsed - 1
+            kept = f"none of {tried} cheaper ones keeps the errors asked for" if tried else "nothing else costs less"
+            return f"{what} of every term: {kept}"
         return (
             f"{what}: errs by {self.position_error_m:.2g} m and {self.energy_error_j:.2g} J over {self.over_s:g} s, "
             f"{self.operations:.0f} instead of {self.full_operations:.0f} operations a period"

@@ -1,8 +1,4 @@
-"""A configuration on its simulated device, as fast as it goes: the daemon's tick without clock, process or telemetry.
-
-The numbers are the daemon's to the last bit, tick by tick, since the parts are the same and the simulated device
-advances by one period a tick whatever the host does.
-"""
+"""A rehearsed configuration as rows, and a summary of them."""
 
 from __future__ import annotations
 
@@ -15,11 +11,9 @@ from typing import NamedTuple
 from hapticd.config.loading import LoadedConfig
 from hapticd.contracts.errors import ConfigError, DriverError
 from hapticd.control.contact import Contact
-from hapticd.control.process import make_tick, place_device
+from hapticd.control.fitting import fitted
+from hapticd.control.rehearsal import Rehearsal
 from hapticd.control.tick import ControlTick
-from hapticd.guard import Mode
-from hapticd.simulation.device import SimulatedDevice
-from hapticd.simulation.options import SimulationOptions
 
 WINDOW_S = 0.5
 """The end of a run that its summary looks at [s]."""
@@ -100,39 +94,24 @@ class OfflineRun:
 
     Attributes:
         ticks: how many ticks that takes.
-        fault: why the daemon would have stopped, once it is known; None as long as it would not.
 
     Raises:
         ConfigError: the duration makes no sense, or the configuration is not one for a simulated device.
     """
 
     def __init__(self, loaded: LoadedConfig, duration_s: float) -> None:
-        self._loaded = loaded
         self._period_ns = loaded.config.loop.period_ns
         self.period_s = loaded.config.loop.period_s
         if not (math.isfinite(duration_s) and duration_s >= self.period_s):
             raise ConfigError(f"duration = {duration_s:g} s: must be at least one period, {self.period_s:g} s")
         self.ticks = round(duration_s / self.period_s)
-        self.fault: str | None = None
-        device = loaded.config.device.driver
-        if not isinstance(loaded.options, SimulationOptions):
-            raise ConfigError(
-                f'{loaded.path}: device.driver = "{device}": only a simulated device runs offline, such as "loopback"'
-            )
-        if loaded.options.clock != "ticks":
-            raise ConfigError(
-                f'{loaded.path}: device.options.clock = "{loaded.options.clock}": must be "ticks" offline'
-            )
-        self._driver = loaded.driver(loaded.options, self.period_s)
-        place_device(loaded, self._driver)
-        self._driver.open()
-        # The true position is nobody's business but a study's, so no driver publishes it.
-        self._model: SimulatedDevice = vars(self._driver)["_device"]
-        try:
-            self._tick = make_tick(loaded, self._driver.info)
-        except BaseException:
-            self._driver.close()
-            raise
+        self._rehearsal = Rehearsal(fitted(loaded))
+        self._tick = self._rehearsal.tick
+
+    @property
+    def fault(self) -> str | None:
+        """Why the daemon would have stopped, once it is known; None as long as it would not."""
+        return self._rehearsal.fault
 
     def run(self, take: Callable[[Row], object], progress: Callable[[int], None] | None = None) -> Summary:
         """Run from the first tick to the last, or to where the model has diverged.
@@ -155,42 +134,24 @@ class OfflineRun:
         return window.summary(self._tick, self.period_s, self.fault)
 
     def _rows(self) -> Iterator[Row]:
-        driver, tick, model, period_ns = self._driver, self._tick, self._model, self._period_ns
-        guard = tick.guard
+        tick, model, period_ns = self._tick, self._rehearsal.model, self._period_ns
         first: Contact | None = tick.contacts[0] if tick.contacts else None
         axis = first.wall.axis if first else 0
         outward = first.wall.outward if first else 1.0
         ledgers = [contact.ledger for contact in tick.contacts]
-        try:
-            tick.start(driver.read())
-            driver.enable()
-            tick.arm()
-            for count in range(self.ticks):
-                sample = driver.read()
-                force_n = tick.step(sample, self.period_s)
-                if guard.mode is not Mode.DISARMED:
-                    driver.write(force_n)
-                else:
-                    driver.disable()
-                if tick.fault:
-                    self.fault = self.fault or f"{count * period_ns / 1e9:g} s: {tick.fault_text}"
-                    tick.fault = 0
-                yield Row(
-                    count * period_ns / 1e9,
-                    model.x_m,
-                    model.v_m_per_s,
-                    first.x_m if first else tick.position_m[0],
-                    outward * force_n[axis],
-                    outward * tick.requested_n[axis],
-                    sum([ledger.energy_j for ledger in ledgers]),
-                    first.ledger.cycle if first else 0,
-                    first.damping_n_s_per_m if first else 0.0,
-                    int(first.in_contact) if first else 0,
-                )
-        except DriverError as error:
-            self.fault = self.fault or str(error)
-        finally:
-            driver.close()
+        for count in self._rehearsal.run(self.ticks):
+            yield Row(
+                count * period_ns / 1e9,
+                model.x_m,
+                model.v_m_per_s,
+                first.x_m if first else tick.position_m[0],
+                outward * tick.force_n[axis],
+                outward * tick.requested_n[axis],
+                sum([ledger.energy_j for ledger in ledgers]),
+                first.ledger.cycle if first else 0,
+                first.damping_n_s_per_m if first else 0.0,
+                int(first.in_contact) if first else 0,
+            )
 
 
 class _Window:

@@ -110,6 +110,14 @@ def test_a_term_that_comes_later_is_a_term() -> None:
     assert found.options.changes[0].coulomb_n == 2.0
 
 
+def test_a_device_with_nothing_to_leave_out_keeps_its_exact_step() -> None:
+    """It is the cheapest integrator too, so there is nothing to try."""
+    found = fit(parse('[device.options]\nmodel = "omega7"\naccuracy = { position_m = 1.0, over_s = 0.1 }', "lab.toml"))
+    assert found is not None
+    assert (found.omitted, found.options.integrator, found.rehearsed) == ((), "exact", 1)
+    assert found.reason == "exact step of every term: nothing else costs less"
+
+
 def test_without_an_accuracy_nothing_is_chosen() -> None:
     loaded = config("")
     assert fit(loaded) is None
