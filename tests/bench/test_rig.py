@@ -10,7 +10,6 @@ from hapticd import cli
 from hapticd.bench import rig
 from hapticd.contracts.errors import HapticdError
 
-
 ATTEMPTS = 5
 
 

@@ -73,10 +73,18 @@ class Remote:
         self.telemetry, self.control = (f"tcp://{computers.address}:{port}" for port in self.ports)
 
     def watch(self, *keys: str) -> subprocess.CompletedProcess[str]:
-        return hapticd("watch", "--once", "--json", "--connect", self.telemetry, *keys, on=self.computers)
+        return self._answered("watch", "--once", "--json", "--connect", self.telemetry, *keys)
 
     def command(self, do: str, *keys: str) -> subprocess.CompletedProcess[str]:
-        return hapticd(do, "--connect", self.control, *keys, on=self.computers)
+        return self._answered(do, "--connect", self.control, *keys)
+
+    def _answered(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Ask again where a busy computer was too slow to answer."""
+        for _ in range(5):
+            done = hapticd(*arguments, on=self.computers)
+            if "no daemon answers" not in done.stderr or "; what answers" in done.stderr:
+                break
+        return done
 
     def local(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(self.daemon.directory / "run")}

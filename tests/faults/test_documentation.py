@@ -17,7 +17,8 @@ from hapticd.supervisor.recovery import FIRST_S, LONGEST_S, STEADY_S
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "faults.md").read_text()
-PROVOKED = "".join((ROOT / "tests" / "daemon" / f"test_{name}.py").read_text() for name in ("faults", "deaths"))
+PLACES = ("daemon/test_faults.py", "daemon/test_deaths.py", "drivers/forcedimension/test_daemon.py")
+PROVOKED = "".join((ROOT / "tests" / place).read_text() for place in PLACES)
 ROWS = re.findall(r"^\| (\d+) \| (\w+) \| (.+) \|$", PAGE, flags=re.MULTILINE)
 
 

@@ -40,6 +40,9 @@ By then its force has long gone: the rig's watchdog has switched the motor off, 
 device.
 """
 
+MOST_UNANSWERED = 32
+"""Questions on their way at once; a rig that is so far behind is asked only now and then, until it has caught up."""
+
 COUNTS_EVERY_S = 1.0
 """How often the rig is asked what it has counted [s]."""
 
@@ -207,7 +210,9 @@ class RigDriver(Driver[RigOptionsT]):
                     raise self._stopped(state)
             elif talk.unanswered:
                 self._bear_silence(talk)
-            if self.state is not _ENABLED:
+            if self.state is not _ENABLED and (
+                talk.unanswered < MOST_UNANSWERED or self._silent % MOST_UNANSWERED == 0
+            ):
                 talk.poll(self._answer_after_us)
             self._until_counts -= 1
             if self._until_counts <= 0:
@@ -260,7 +265,7 @@ class RigDriver(Driver[RigOptionsT]):
         self._silent += 1
         if self._silent >= self._most_silent:
             raise DeviceTimeoutError(
-                f"{self.NAME}: the rig on {talk.link.where} has not answered {talk.unanswered} times in a row: is it "
+                f"{self.NAME}: the rig on {talk.link.where} has not answered for {self._silent} ticks: is it "
                 "unplugged, or without power?"
             )
 

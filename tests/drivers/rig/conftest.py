@@ -10,7 +10,7 @@ import pytest
 
 from hapticd_drivers.rig import conversation
 from tests.drivers.rig.device import PATIENCE_S, Rig, build
-from tests.firmware.board import Board, Built
+from tests.firmware.board import Built
 from tests.firmware.board import build as build_board
 
 
@@ -31,10 +31,3 @@ def rig(rig_core: ctypes.CDLL, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.fixture(scope="session")
 def board_parts(tmp_path_factory: pytest.TempPathFactory) -> Built:
     return build_board(tmp_path_factory.mktemp("board"))
-
-
-@pytest.fixture
-def board(board_parts: Built, tmp_path: Path) -> Iterator[Board]:
-    """The AVR firmware on a simulated processor; a frame from here is a millisecond there."""
-    with Board(board_parts, tmp_path / "board", pace="frames") as made:
-        yield made

@@ -9,7 +9,8 @@ import itertools
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import msgpack
 import pytest
@@ -17,7 +18,7 @@ import zmq
 
 from hapticd.contracts.event import EventCode
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
-from tests.firmware.board import Board
+from tests.firmware.board import Board, Built
 
 WALL_M = -0.01
 STIFFNESS_N_PER_M = 2000.0
@@ -35,7 +36,6 @@ def config(board: Board, homing: str) -> str:
     return f"""
         [loop]
         law_budget = 1.0
-        realtime = "off"
         [device]
         driver = "serial-rig"
         [device.options]
@@ -77,7 +77,10 @@ class Lab:
     def ask(self, do: str) -> str:
         """What the daemon refuses a command with; "" when it obeys."""
         self._socket.send(msgpack.packb({"do": do}))
-        assert self._socket.poll(int(4e3 * PATIENCE_S)), f"no answer to {do}"
+        end_s = time.monotonic() + 4.0 * PATIENCE_S
+        while not self._socket.poll(200):
+            assert self.daemon.process.poll() is None, f"the daemon ended: {self.daemon.output()}"
+            assert time.monotonic() < end_s, f"no answer to {do}: {self.daemon.output()}"
         answer = msgpack.unpackb(self._socket.recv())
         return "" if answer["ok"] else str(answer["text"])
 
@@ -136,23 +139,37 @@ def until(subscriber: Subscriber, code: EventCode, text: str) -> None:
         pass
 
 
-@pytest.fixture
-def lab(board: Board) -> Iterator[Lab]:
-    board.place(HELD_M)
-    with Lab(board) as made:
-        yield made
+def on_a_board(place_m: float, homing: str = "here") -> Callable[[Callable[[Lab], None]], Callable[..., None]]:
+    """A test of a lab of its own; anew where the supervisor ended a loop that this computer did not let run.
+
+    Args:
+        place_m: where the handle stands at first.
+        homing: how the rig is calibrated.
+    """
+
+    def decorate(test: Callable[[Lab], None]) -> Callable[..., None]:
+        def run(board_parts: Built, tmp_path: Path) -> None:
+            for attempt in range(1, ATTEMPTS + 1):
+                with Board(board_parts, tmp_path / "board", pace="frames") as board:
+                    board.place(place_m)
+                    with Lab(board, homing) as lab:
+                        try:
+                            test(lab)
+                        except AssertionError:
+                            if attempt == ATTEMPTS or "stood still" not in lab.daemon.output():
+                                raise
+                        else:
+                            return
+
+        run.__doc__ = test.__doc__
+        return run
+
+    return decorate
 
 
-@pytest.fixture
-def homing_lab(board: Board) -> Iterator[Lab]:
+@on_a_board(-0.04, "low_switch")
+def test_a_rig_is_identified_homed_enabled_and_holds_a_wall(lab: Lab) -> None:
     """Its handle stands near the home switch, which is at the lower end."""
-    board.place(-0.04)
-    with Lab(board, "low_switch") as made:
-        yield made
-
-
-def test_a_rig_is_identified_homed_enabled_and_holds_a_wall(homing_lab: Lab) -> None:
-    lab = homing_lab
     with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status", "hapticd/position") as subscriber:
         status = subscriber.until("hapticd/status")
         assert (status["device"], status["serial"], status["armed"]) == ("serial-rig", "0001", False)
@@ -174,6 +191,7 @@ def test_a_rig_is_identified_homed_enabled_and_holds_a_wall(homing_lab: Lab) -> 
     assert lab.board.state().motor_n == 0.0
 
 
+@on_a_board(HELD_M)
 def test_when_the_daemon_is_stopped_the_rig_lets_go_and_takes_no_force_until_it_is_enabled_anew(lab: Lab) -> None:
     with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
         subscriber.until("hapticd/status")  # it is connected
@@ -193,6 +211,7 @@ def test_when_the_daemon_is_stopped_the_rig_lets_go_and_takes_no_force_until_it_
         lab.press()
 
 
+@on_a_board(HELD_M)
 def test_a_killed_loop_leaves_no_force(lab: Lab) -> None:
     os.kill(lab.press().daemon.control_pid(), signal.SIGKILL)
     assert lab.daemon.wait_exit() == 1
@@ -200,6 +219,7 @@ def test_a_killed_loop_leaves_no_force(lab: Lab) -> None:
     assert "the device is without force" in lab.daemon.output()
 
 
+@on_a_board(HELD_M)
 def test_a_rig_whose_cable_is_pulled_comes_back_and_has_to_be_calibrated(lab: Lab) -> None:
     with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
         subscriber.until("hapticd/status")  # it is connected
@@ -212,6 +232,7 @@ def test_a_rig_whose_cable_is_pulled_comes_back_and_has_to_be_calibrated(lab: La
         lab.press()
 
 
+@on_a_board(HELD_M)
 def test_a_reversed_motor_never_gets_to_push_a_wall(lab: Lab) -> None:
     lab.board.reverse_motor(True)
     before_m = lab.board.state().position_m

@@ -322,6 +322,24 @@ def test_a_rig_that_says_nothing_any_more_is_lost_after_half_a_second_of_ticks(r
     rig.up = bytes
 
 
+def test_a_rig_that_is_behind_is_not_flooded_and_is_heard_again_when_it_has_caught_up(
+    rig: Rig, driver: SerialRig
+) -> None:
+    driver.open()
+    settle(rig, driver)
+    rig.up = lambda data: b""
+    talk = driver._opened()
+    before = talk._sequence
+    for _ in range(320):
+        driver.read()
+    assert (talk._sequence - before) & 0xFFFF <= 32 + 320 // 32 + 1
+    rig.up = bytes
+    before = driver.read().sequence
+    for _ in range(33):
+        settle(rig, driver)
+    assert driver.read().sequence > before
+
+
 def test_opening_takes_the_force_away_that_another_host_has_left(rig: Rig, driver: SerialRig) -> None:
     driver.open()
     driver.enable()

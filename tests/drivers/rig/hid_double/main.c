@@ -3,6 +3,7 @@
  * It prints the directory that clients need as UMOCKDEV_DIR, then answers each line of its input with one line. */
 #define _GNU_SOURCE
 #include <poll.h>
+#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -169,6 +170,9 @@ static bool obey(struct rig_on_usb *rig, char *line)
 int main(int count, char **arguments)
 {
     static struct rig_on_usb rig;
+    /* A rig has a processor of its own; where that may be had, so does this one in effect. */
+    struct sched_param soon = {.sched_priority = 1};
+    (void)sched_setscheduler(0, SCHED_FIFO, &soon);
     rig.host = host_rig_new((uint8_t)(count > 1 ? atoi(arguments[1]) : 1));
     rig.bed = bed_new();
     rig.about = host_rig_description(rig.host);
