@@ -1,4 +1,4 @@
-"""Ask a running daemon to do something: what `hapticd arm`, `disarm`, `clear` and `reload` are made of."""
+"""Ask a running daemon to do something: what `hapticd arm`, `disarm`, `reload` and their like are made of."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def command(
     """Send one request and wait for its answer.
 
     Args:
-        do: `status`, `arm`, `disarm`, `clear`, `reload` or `stop`.
+        do: `status`, `arm`, `disarm`, `calibrate`, `tare`, `clear`, `reload` or `stop`.
         instance: which daemon on this computer, when no endpoint is given.
         timeout_s: how long to wait for it [s].
         connect: the daemon's `control.tcp` as seen from here, such as "tcp://lab.example:9873".

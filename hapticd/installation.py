@@ -84,7 +84,7 @@ class Installation:
     def __init__(self, root: Path = Path("/"), executable: Path | None = None) -> None:
         self.root = root.absolute()
         self.live = self.root == Path("/")
-        self.executable = self._inside(executable or Path(sys.executable).absolute().with_name("hapticd"))
+        self.executable = self._inside((executable or Path(sys.executable).with_name("hapticd")).absolute())
 
     def files(self) -> list[Installed]:
         """Every file of the service except its configuration."""
@@ -257,7 +257,7 @@ def unit_states() -> list[UnitState]:
 def _open_to_all(place: Path) -> bool:
     try:
         return bool(place.stat().st_mode & 0o001)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return True
 
 

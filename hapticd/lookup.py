@@ -77,7 +77,7 @@ def _ask(name: str, options: DriverOptions | None, find: bool, timeout_s: float)
             if pipe is not None:
                 pipe.close()
         return Lookup(name, problem=f"it did not answer within {timeout_s:g} s")
-    if process.returncode != 0:
+    if process.returncode != 0 or not answer:
         died = process.returncode < 0
         how = f"it crashed, signal {-process.returncode}" if died else f"it ended with exit code {process.returncode}"
         last = words.strip().rpartition("\n")[2]

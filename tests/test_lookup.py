@@ -48,6 +48,7 @@ def test_a_driver_is_given_its_options() -> None:
         ("raise DriverError('the bus is down')", "the bus is down"),
         ("raise ValueError('odd')", "its driver failed: ValueError: odd"),
         ("raise SystemExit('enough')", "it ended with exit code 1: enough"),
+        ("os._exit(0)", "it ended with exit code 0"),
         ("os.abort()", "it crashed, signal 6"),
         ("return ctypes.string_at(0)", "it crashed, signal 11"),
         ("return [1]", "1 is no FoundDevice"),

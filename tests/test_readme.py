@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from hapticd.cli import COMMANDS
+from hapticd.cli.overview import COMMANDS
 from tests.daemon.running import HAPTICD, Daemon
 
 ROOT = Path(__file__).parents[1]

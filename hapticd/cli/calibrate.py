@@ -28,6 +28,7 @@ def calibrate(
 
     Example: hapticd calibrate --countdown 10
     """
+    command("status", instance, connect=connect, keys=keys)  # nobody clears a workspace for a daemon that is not there
     for left_s in range(countdown_s, 0, -1):
         typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
         time.sleep(1.0)

@@ -46,15 +46,21 @@ def list_records(instance: Instance = DEFAULT_INSTANCE, directory: Directory = N
 
     Example: hapticd fault list --instance left
     """
-    headers = [(path, read_header(path)) for path in _paths(instance, directory)]
+    headers, damaged = [], []
+    for path in _paths(instance, directory):
+        try:
+            headers.append((path, read_header(path)))
+        except HapticdError as error:  # one of them hides no other
+            damaged.append(str(error))
     if as_json:
         typer.echo(json.dumps([{"name": path.stem, "path": str(path), **header} for path, header in headers]))
-        return
-    if not headers:
+    elif not headers and not damaged:
         typer.echo("no fault records in " + " or ".join(map(str, _places(instance, directory))), err=True)
-    for path, header in headers:
+    for path, header in [] if as_json else headers:
         event = header["event"]
         typer.echo(f"{path.stem}  {event['code']} {event['name']}  {event['text']}")
+    if damaged:
+        raise HapticdError("\n".join(damaged))
 
 
 @app.command()

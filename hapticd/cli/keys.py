@@ -152,7 +152,11 @@ def _make_for_a_client(name: str, watch_only: bool, force: bool) -> None:
 
 def _given(text: str) -> Key:
     """A key, or what a file says."""
-    return Key(text) if is_key(text) and not Path(text).exists() else read(Path(text))
+    if os.path.lexists(text):
+        return read(Path(text))
+    if not is_key(text):
+        raise ConfigError(f"{text}: neither a key, which has 40 characters of Z85, nor a file")
+    return Key(text)
 
 
 def _write_client(name: str, pair: Key, force: bool) -> Path:

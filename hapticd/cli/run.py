@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+from logging.handlers import QueueHandler, QueueListener
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Annotated
 
 import typer
@@ -36,5 +38,12 @@ def run(
     from hapticd.supervisor.journal import log_handler
     from hapticd.supervisor.service import Service
 
-    logging.basicConfig(level=logging.INFO, handlers=[log_handler()])
-    raise typer.Exit(Service(loaded, instance).run())
+    # Written by a thread: a terminal that is stopped (Ctrl-S) or cut off must not stop the supervisor.
+    lines: SimpleQueue[logging.LogRecord] = SimpleQueue()
+    writer = QueueListener(lines, log_handler())
+    logging.basicConfig(level=logging.INFO, format="%(message)s", handlers=[QueueHandler(lines)])
+    writer.start()
+    try:
+        raise typer.Exit(Service(loaded, instance).run())
+    finally:
+        writer.stop()

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import typer
+
+from hapticd.control.realtime import die_with_parent
 
 _POLL_S = 0.1
 _STOP_TIMEOUT_S = 10.0
@@ -25,12 +29,20 @@ def run_watched(config: Path, instance: str) -> int:
         The daemon's exit code.
     """
     hapticd = [sys.executable, "-m", "hapticd"]
+    # Whatever ends us, be it the terminal that is closed, the daemon ramps its force out and the view ends as well.
+    with_us = partial(die_with_parent, os.getpid())
     with tempfile.TemporaryFile("w+") as log:
         # In a session of its own: the terminal's interrupt closes the view, which then ends the daemon in good order.
         daemon = subprocess.Popen(
-            [*hapticd, "run", "--config", str(config), "--instance", instance], stderr=log, start_new_session=True
+            [*hapticd, "run", "--config", str(config), "--instance", instance],
+            stderr=log,
+            start_new_session=True,
+            preexec_fn=with_us,  # noqa: PLW1509 - there is one thread
         )
-        view = subprocess.Popen([*hapticd, "watch", "--instance", instance])
+        view = subprocess.Popen(
+            [*hapticd, "watch", "--instance", instance],
+            preexec_fn=with_us,  # noqa: PLW1509 - there is one thread
+        )
         try:
             with contextlib.suppress(KeyboardInterrupt):
                 while view.poll() is None and daemon.poll() is None:

@@ -128,22 +128,6 @@ def state(directory: Path) -> Finding:
     return advice(shown, largest) if free < _ENOUGH else ok(shown)
 
 
-def state_directory(name: str, environment: Mapping[str, str], home: Path) -> Path:
-    """Where an instance keeps what outlives it.
-
-    Args:
-        name: of the instance.
-        environment: systemd's or the user's.
-        home: of the user.
-    """
-    given = environment.get("STATE_DIRECTORY", "").split(":")[0]
-    if given:
-        return Path(given)
-    if os.geteuid() == 0:
-        return Path("/var/lib/hapticd") / name
-    return Path(environment.get("XDG_STATE_HOME") or home / ".local/state") / "hapticd" / name
-
-
 def _free(name: str, endpoint: str, process: int) -> Finding:
     parts = urlsplit(endpoint)
     host, port = (parts.hostname or "").replace("*", ""), parts.port or 0  # `*` is every address

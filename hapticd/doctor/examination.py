@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-import os
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from hapticd.doctor import configuration, driver, endpoints, kernel, memory, processor, rules, scheduling, usb
@@ -14,6 +13,7 @@ from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.finding import Check, Finding, Mark, examine, ok
 from hapticd.doctor.latency import Latency, judge, measure
 from hapticd.doctor.tree import ROOT
+from hapticd.faults.place import fault_directory
 from hapticd.keys.directory import KeyDirectory, key_directory
 from hapticd.telemetry.endpoint import runtime_directory
 
@@ -29,7 +29,6 @@ class Examination:
         wanted: what the daemon would be asked for.
         instance: name of the daemon.
         root: the file system, for /proc and /sys.
-        environment: where the user says where things are.
 
     Attributes:
         latency: what was measured, None while nothing was.
@@ -38,18 +37,16 @@ class Examination:
     wanted: Wanted
     instance: str
     root: Path = ROOT
-    environment: Mapping[str, str] = field(default_factory=lambda: dict(os.environ))
     latency: Latency | None = None
 
     def checks(self) -> list[Check]:
         """Every check except the measurement."""
         root, loop, name = self.root, self.wanted.loop, self.wanted.driver
         options = self.wanted.loaded.options if self.wanted.loaded else None
-        home = Path(self.environment.get("HOME", "/"))
         directory = runtime_directory(self.instance)
         tried = functools.cache(lambda: attempt(loop.priority))
         daemon = functools.cache(lambda: endpoints.running(directory, root))
-        state = endpoints.state_directory(self.instance, self.environment, home)
+        faults = fault_directory(self.instance)
         return [
             Check("kernel.preemption", "kernel", lambda: kernel.preemption(root)),
             Check("kernel.timers", "timers", lambda: kernel.timers(root)),
@@ -74,7 +71,7 @@ class Examination:
             Check("endpoints.runtime", "directory", lambda: endpoints.runtime(directory)),
             Check("endpoints.tcp", "endpoint", lambda: endpoints.tcp(self.wanted.tcp, _or_none(daemon))),
             Check("endpoints.keys", "keys", lambda: endpoints.keys(self.wanted.tcp, KeyDirectory(key_directory()))),
-            Check("endpoints.state", "disk", lambda: endpoints.state(state)),
+            Check("endpoints.state", "disk", lambda: endpoints.state(faults)),
         ]
 
     def findings(self) -> Iterator[Finding]:

@@ -21,6 +21,8 @@ MAGIC = b"hapticd fault record 1\n"
 SUFFIX = ".fault"
 
 _LARGEST_HEADER = 1 << 24
+_KEYS = {"event", "instance", "version", "device", "driver", "config", "law", "ticks"}
+_EVENT_KEYS = {"code", "name", "text", "seq", "deadline_ns", "timestamp"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +96,8 @@ def read(path: Path) -> FaultRecord:
             raise HapticdError(f"{path}: its ticks are laid out as hapticd {header['version']} does; read it with that")
         rows = memoryview(zlib.decompress(packed))
         found = [layout.unpack(rows[at : at + layout.size]) for at in range(0, len(rows), layout.size)]
-    except (zlib.error, KeyError, TypeError, ValueError, IndexError) as error:
-        raise HapticdError(f"{path}: damaged: {error}") from error
+    except (zlib.error, KeyError, TypeError, ValueError, IndexError, OverflowError, MemoryError) as error:
+        raise HapticdError(f"{path}: damaged: {error or type(error).__name__}") from error
     return FaultRecord(path.stem, header, found)
 
 
@@ -105,8 +107,14 @@ def _parts(path: Path, ticks: bool) -> tuple[dict[str, Any], bytes]:
             if file.readline(len(MAGIC)) != MAGIC:
                 raise HapticdError(f"{path}: no fault record that this version of hapticd can read")
             header: dict[str, Any] = json.loads(file.readline(_LARGEST_HEADER))
+            if not _has(header, _KEYS) or not _has(header["event"], _EVENT_KEYS):
+                raise HapticdError(f"{path}: damaged: its header is none of a fault record")
             return header, file.read() if ticks else b""
     except OSError as error:
         raise HapticdError(f"{path}: {error.strerror}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise HapticdError(f"{path}: damaged: {error}") from error
+
+
+def _has(table: Any, keys: set[str]) -> bool:
+    return isinstance(table, dict) and table.keys() >= keys

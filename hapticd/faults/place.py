@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from hapticd.telemetry.endpoint import named_directory
+
 _SYSTEM = Path("/var/lib/hapticd")
 _FAULTS = "faults"
 
@@ -14,30 +16,26 @@ def fault_directory(instance: str) -> Path:
 
     Below $HAPTICD_STATE_DIR/<instance>, else systemd's $STATE_DIRECTORY, else /var/lib/hapticd/<instance> for root,
     else $XDG_STATE_HOME/hapticd/<instance>, which is ~/.local/state/hapticd/<instance> where that is not set.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
     """
-    given = _given(instance)
+    given = named_directory("STATE", instance)
     if given is not None:
         return given / _FAULTS
     return (_SYSTEM / instance if os.geteuid() == 0 else _user(instance)) / _FAULTS
 
 
 def fault_directories(instance: str) -> list[Path]:
-    """Where to look for the fault records of an instance: the system's daemon, and this user's own."""
-    given = _given(instance)
+    """Where to look for the fault records of an instance: the system's daemon, and this user's own.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
+    given = named_directory("STATE", instance)
     if given is not None:
         return [given / _FAULTS]
     return [_SYSTEM / instance / _FAULTS, _user(instance) / _FAULTS]
-
-
-def _given(instance: str) -> Path | None:
-    """The directory that the environment names, if it does."""
-    base = os.environ.get("HAPTICD_STATE_DIR")
-    if base:
-        return Path(base) / instance
-    unit = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
-    if unit:
-        return Path(unit) if Path(unit).name == instance else Path(unit) / instance
-    return None
 
 
 def _user(instance: str) -> Path:

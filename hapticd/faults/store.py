@@ -34,7 +34,8 @@ class FaultStore:
         except FileNotFoundError:
             return []
         except OSError as error:
-            raise HapticdError(f"{self.directory}: {error.strerror}; join the group hapticd, or use sudo") from error
+            advice = "; join the group hapticd, or use sudo" if isinstance(error, PermissionError) else ""
+            raise HapticdError(f"{self.directory}: {error.strerror}{advice}") from error
 
     def write(self, epoch_s: float, code: int, content: bytes, keep: int) -> Path:
         """Add a record, whole or not at all, and remove the oldest of those that are too many.

@@ -18,6 +18,9 @@ from hapticd.control.shared import RECORDS, SKIPPED, SUPERVISOR_BEAT, EventReade
 END_TIMEOUT_S = 1.0
 """How long the loop may take to ramp its force out, or to let go of a device that is lost [s]."""
 
+KILL_TIMEOUT_S = 1.0
+"""How long a killed process may take to be gone [s]; one that waits inside the kernel for its hardware stays."""
+
 STALL_S = 0.1
 """How long the loop may stand still before it is given up [s]; at least ten periods."""
 
@@ -126,4 +129,5 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     """End a control process at once, whatever it is doing."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(process.pid, signal.SIGKILL)
-    process.wait()
+    with contextlib.suppress(subprocess.TimeoutExpired):  # whatever can be done without it has to be done now
+        process.wait(KILL_TIMEOUT_S)

@@ -46,6 +46,7 @@ class FaultRecorder:
         self._store = FaultStore(directory)
         self._waiting: deque[_Job] = deque()
         self._writing: _Job | None = None
+        self._problem = ""
 
     def begin(self, event: Event, epoch_s: float, shared: SharedMemory, rate_hz: float, header: dict[str, Any]) -> None:
         """Keep the ticks around a fault, once those after it have come.
@@ -58,7 +59,10 @@ class FaultRecorder:
             header: what the record says of itself besides the event.
         """
         if len(self._waiting) < _MOST_WAITING:
-            self._waiting.append(_Job(self._store, event, epoch_s, shared, rate_hz, header))
+            try:
+                self._waiting.append(_Job(self._store, event, epoch_s, shared, rate_hz, header))
+            except OSError as error:  # no more files or memory to be had: no reason to end
+                self._problem = f"fault record not written: {error.strerror}"
 
     def turn(self, keep: int) -> str:
         """Start what is due; returns at once. What went wrong with a record that is done, "" when nothing did.
@@ -66,12 +70,12 @@ class FaultRecorder:
         Args:
             keep: most records to keep.
         """
-        problem = ""
+        problem, self._problem = self._problem, ""
         job = self._writing
         if job is not None and not job.is_alive():
             self._writing = None
-            problem = job.problem
-            self.written += not problem
+            problem = job.problem or problem
+            self.written += not job.problem
         if self._writing is None and self._waiting and self._waiting[0].due():
             self._writing = self._waiting.popleft()
             self._writing.keep = keep

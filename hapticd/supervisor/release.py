@@ -72,7 +72,8 @@ class Release:
     def close(self) -> None:
         """The helper is not needed any more."""
         self._helper.kill()
-        self._helper.communicate()
+        with contextlib.suppress(subprocess.TimeoutExpired):  # it waits inside the kernel for its hardware
+            self._helper.communicate(timeout=TIMEOUT_S)
 
 
 def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:

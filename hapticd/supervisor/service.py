@@ -25,6 +25,7 @@ from hapticd.supervisor.reload import Reload
 from hapticd.supervisor.report import Report
 from hapticd.supervisor.requests import Answer, Requests
 from hapticd.supervisor.start import Start
+from hapticd.supervisor.terminal import Terminal
 from hapticd.telemetry.endpoint import CONTROL, TELEMETRY
 from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.wire import measure_epoch_offset_ns
@@ -64,6 +65,7 @@ class Service:
         self.config = config
         self.instance = instance
         self.notifier = Notifier()
+        self._terminal = Terminal()
         offset_ns = measure_epoch_offset_ns()
         ring = key_ring(config)
         with contextlib.ExitStack() as undo:
@@ -80,13 +82,13 @@ class Service:
             undo.callback(self.publisher.close)
             self.commands = CommandSocket(self.lock.directory / CONTROL, config.config.control.tcp, ring)
             undo.callback(self.commands.close)
+            self.requests = Requests(self.control.shared)
+            self.recovery = Recovery()
+            self.report = Report(instance, offset_ns)
+            self.chronicle = Chronicle(instance, self.publisher, self.report, fault_directory(instance), offset_ns)
+            self.reload = Reload(self)
+            undo.callback(self.reload.close)
             self._undo = undo.pop_all()
-        self.requests = Requests(self.control.shared)
-        self.recovery = Recovery()
-        self.report = Report(instance, offset_ns)
-        self.chronicle = Chronicle(instance, self.publisher, self.report, fault_directory(instance), offset_ns)
-        self.reload = Reload(self)
-        self._undo.callback(self.reload.close)
         self.exit_code: int | None = None
         self._device_lost: Event | None = None
         self._dropped_told = 0
@@ -118,7 +120,7 @@ class Service:
         loop = asyncio.get_running_loop()
         loop.add_signal_handler(signal.SIGTERM, self._stop, "SIGTERM")
         loop.add_signal_handler(signal.SIGINT, self._stop, "interrupt")
-        loop.add_signal_handler(signal.SIGHUP, self.reload.ask, _nobody)
+        loop.add_signal_handler(signal.SIGHUP, self._hang_up)
         settings = self.config.config
         log.info(
             "%s: %s on %s at %g Hz, law %s, publishing on %s",
@@ -142,6 +144,7 @@ class Service:
             self._turn()
             await asyncio.sleep(DRAIN_S)
         self.recovery.stop()
+        self.requests.abandon("the daemon has stopped")
         self.chronicle.close(self.config, self.control, RECORD_TIMEOUT_S)
         return self.exit_code
 
@@ -217,6 +220,13 @@ class Service:
 
     def _tell_now(self, code: EventCode, text: str, **fields: float | int | str) -> None:
         self.chronicle.tell_now(code, text, self.config, self.control, **fields)
+
+    def _hang_up(self) -> None:
+        """SIGHUP: from a person a reload, from a terminal that is closed the end."""
+        if self._terminal.closed():
+            self._stop("the terminal was closed")
+        else:
+            self.reload.ask(_nobody)
 
     def _stop(self, why: str) -> None:
         """Let the loop ramp the force out and end."""

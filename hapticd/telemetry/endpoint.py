@@ -6,6 +6,7 @@ import os
 import re
 import stat
 from pathlib import Path
+from typing import Literal
 
 from hapticd.contracts.errors import ConfigError, InstanceError
 
@@ -29,7 +30,7 @@ def runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
     Raises:
         ConfigError: the name is none that a directory could have.
     """
-    given = _given(instance)
+    given = named_directory("RUNTIME", instance)
     if given is not None:
         return given
     system = _SYSTEM / instance
@@ -71,7 +72,7 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
         ConfigError: the instance's name is none that a directory could have.
         InstanceError: the daemon's directory is not open to this user.
     """
-    given = _given(instance)
+    given = named_directory("RUNTIME", instance)
     if given is not None:
         return given / name
     closed = None
@@ -91,14 +92,18 @@ def telemetry_endpoint(instance: str = DEFAULT_INSTANCE) -> str:
     return f"ipc://{locate(TELEMETRY, instance)}"
 
 
-def _given(instance: str) -> Path | None:
-    """The directory that the environment names, if it does."""
+def named_directory(kind: Literal["RUNTIME", "STATE"], instance: str) -> Path | None:
+    """The directory of an instance that the environment names, if it does: $HAPTICD_<kind>_DIR, else systemd's.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
     if _INSTANCE.fullmatch(instance) is None:
         raise ConfigError(f"instance = {instance!r}: letters, digits and _ . - only, at most 32, the first no sign")
-    base = os.environ.get("HAPTICD_RUNTIME_DIR")
+    base = os.environ.get(f"HAPTICD_{kind}_DIR")
     if base:
         return Path(base) / instance
-    unit = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    unit = os.environ.get(f"{kind}_DIRECTORY", "").split(":")[0]
     if unit:
         return Path(unit) if Path(unit).name == instance else Path(unit) / instance
     return None

@@ -67,7 +67,8 @@ class Status:
         device: what the device is.
         serial: its serial number, "" without one.
         simulated: no real device.
-        calibrated: the device knows where it is; until then its positions are nothing to rely on, and it takes no force.
+        calibrated: the device knows where it is; until then its positions are nothing to rely on, and it takes no
+            force.
         device_metrics: numbers that its driver keeps, such as frames lost, since it was opened.
         accuracy: the model that a simulated device got for the accuracy asked for, and why; "" when none was asked for.
         axes: names of its axes, in the order of positions and forces.

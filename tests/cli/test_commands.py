@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -14,7 +15,8 @@ import pytest
 import typer
 
 from hapticd import __version__
-from hapticd.cli import COMMANDS, application, main
+from hapticd.cli import main
+from hapticd.cli.overview import COMMANDS, application
 from hapticd.contracts.errors import DeviceNotFoundError
 from hapticd.share import directory
 
@@ -132,6 +134,38 @@ def test_whoever_debugs_gets_the_traceback(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("hapticd.cli.check.load", lambda _: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         main(["check", "x.toml"])
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+def test_a_stream_that_is_closed_leads_nowhere(closed: str) -> None:
+    """And the lines for it go to no other one."""
+    for arguments, status in (f"check {shlex.quote(GOOD)}", 0), ("nonsense", 2):
+        done = subprocess.run(
+            ["sh", "-c", f"{HAPTICD} {arguments} {closed}"], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == status
+        assert "Traceback" not in done.stderr
+        assert (done.stdout != "") == (status == 0 and not closed.count(" >&-") and not closed.startswith(">"))
+        assert (done.stderr != "") == (status != 0 and "2>&-" not in closed)
+
+
+@pytest.mark.parametrize("arguments", [("check", GOOD), ("config", "schema"), ("--help",)])
+def test_output_onto_a_full_disk_is_an_error_of_one_line(arguments: tuple[str, ...]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([HAPTICD, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "hapticd: standard output: No space left on device\n")
+
+
+def test_an_interrupt_while_it_still_imports_shows_nothing(tmp_path: Path) -> None:
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt")
+    done = hapticd("check", GOOD, PYTHONPATH=str(tmp_path))
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+def test_nobody_clears_a_workspace_for_a_daemon_that_is_not_there(tmp_path: Path) -> None:
+    done = hapticd("calibrate", HAPTICD_RUNTIME_DIR=str(tmp_path))
+    assert done.returncode == 1
+    assert done.stderr.startswith("hapticd: no daemon answers on ")
 
 
 def test_an_interrupt_ends_with_130(tmp_path: Path) -> None:

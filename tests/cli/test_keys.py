@@ -135,10 +135,10 @@ def test_what_is_there_already_stays_and_a_refusal_leaves_no_client_behind(keys:
     [
         (["make", "--watch-only"], "give it a NAME"),
         (["make", "--server-key", "x"], "give it a NAME"),
-        (["make", "laptop", "--server-key", "nonsense"], "nonsense: no such file"),
+        (["make", "laptop", "--server-key", "nonsense"], "nonsense: neither a key"),
         (["make", "../laptop", "--server-key", "x" * 40], "'../laptop': a name, not a path"),
         (["add", "laptop"], "KEY"),
-        (["add", "laptop", "#" * 40], "no such file"),
+        (["add", "laptop", "x" * 39], "neither a key, which has 40 characters of Z85, nor a file"),
         (["remove", "laptop"], "laptop: not listed; listed are: none"),
         (["lst"], "'lst'"),
     ],

@@ -198,3 +198,21 @@ def test_whatever_arrives_at_the_control_socket_is_refused_and_the_daemon_goes_o
     assert answer["status"]["armed"]
     socket.close()
     context.term()
+
+
+def test_a_request_that_the_loop_never_sees_is_answered_when_the_daemon_ends(daemon: Daemon) -> None:
+    with zmq.Context() as context, context.socket(zmq.DEALER) as socket:
+        socket.connect(f"ipc://{daemon.directory}/run/default/control")
+        socket.send(msgpack.packb({"do": "status"}))
+        assert socket.poll(30_000)
+        socket.recv()
+        control = daemon.control_pid()
+        daemon.process.send_signal(signal.SIGSTOP)
+        os.kill(control, signal.SIGSTOP)
+        socket.send(msgpack.packb({"do": "arm"}))
+        daemon.process.send_signal(signal.SIGCONT)
+        assert socket.poll(30_000)
+        answer = msgpack.unpackb(socket.recv())
+    assert not answer["ok"]
+    assert "stopped" in answer["text"]
+    assert daemon.wait_exit() == 1

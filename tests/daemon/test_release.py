@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from hapticd.config.loading import parse
+from hapticd.supervisor.controlled import kill
 from hapticd.supervisor.release import TIMEOUT_S, Release
 
 CONFIG = '[loop]\nrealtime = "off"\n[device]\ndriver = "loopback"\n'
@@ -42,3 +45,21 @@ def test_a_helper_that_cannot_start_is_told(release: Release, monkeypatch: pytes
     release.close()
     monkeypatch.setattr("sys.executable", "/bin/false")
     assert "did not start" in release.release()
+
+
+class _Unkillable(subprocess.Popen[bytes]):
+    """Stands for a process that waits inside the kernel for its hardware: no signal ends it."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        assert timeout is not None, "whoever waits for it without an end hangs as well"
+        raise subprocess.TimeoutExpired(self.args, timeout)
+
+
+def test_a_control_process_that_cannot_be_killed_does_not_keep_the_force_from_being_taken_away(
+    release: Release,
+) -> None:
+    with _Unkillable(["/bin/sleep", "1000"]) as stuck:
+        kill(stuck)
+        assert release.release() == "the device is without force"
+        subprocess.Popen.wait(stuck, 60.0)
+        stuck.wait = partial(subprocess.Popen.wait, stuck)  # type: ignore[method-assign]  # it is gone

@@ -2,49 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import pty
-import select
-import subprocess
-import time
+import signal
 from pathlib import Path
 
-from tests.daemon.running import HAPTICD, PATIENCE_S
+import pytest
+
+from tests.daemon.running import HAPTICD, PATIENCE_S, wait_until
+from tests.daemon.terminal import Terminal
 
 CONFIG = Path(__file__).parents[2] / "config" / "hapticd.toml"
-
-
-class Terminal:
-    """A command at a pseudo-terminal of 80x24."""
-
-    def __init__(self, *command: str, environment: dict[str, str]) -> None:
-        ours, theirs = pty.openpty()
-        environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24", **environment}
-        self.process = subprocess.Popen(
-            command, stdin=theirs, stdout=theirs, stderr=theirs, env=environment, start_new_session=True
-        )
-        os.close(theirs)
-        self._descriptor = ours
-        self.shown = ""
-
-    def until(self, text: str) -> None:
-        """Read until the terminal has shown this."""
-        end_s = time.monotonic() + PATIENCE_S
-        while text not in self.shown:
-            assert time.monotonic() < end_s, f"never showed {text!r}: {self.shown[-2000:]}"
-            if select.select([self._descriptor], [], [], 0.1)[0]:
-                try:
-                    self.shown += os.read(self._descriptor, 65536).decode(errors="replace")
-                except OSError:  # the other side is gone
-                    assert text in self.shown, self.shown[-2000:]
-
-    def type(self, keys: bytes) -> None:
-        os.write(self._descriptor, keys)
-
-    def close(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        os.close(self._descriptor)
 
 
 def test_from_one_command_to_a_live_view_and_back(tmp_path: Path) -> None:
@@ -72,5 +38,21 @@ def test_a_daemon_that_cannot_start_says_why_and_ends_the_view(tmp_path: Path) -
     try:
         terminal.until("safety.max_force_n")
         assert terminal.process.wait(PATIENCE_S) == 2
+    finally:
+        terminal.close()
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+def test_a_daemon_does_not_outlive_whoever_started_it_with_a_view(tmp_path: Path, end: signal.Signals) -> None:
+    """Else an armed device would go on with nobody before it."""
+    config = tmp_path / "lab.toml"
+    config.write_text("")
+    command = (HAPTICD, "run", "--config", str(config), "--watch")
+    terminal = Terminal(*command, environment={"HAPTICD_RUNTIME_DIR": str(tmp_path)})
+    try:
+        terminal.until("ARMED")
+        terminal.process.send_signal(end)
+        terminal.process.wait(PATIENCE_S)
+        wait_until(lambda: not list((tmp_path / "default").iterdir()), "the daemon to end")
     finally:
         terminal.close()

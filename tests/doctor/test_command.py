@@ -154,6 +154,11 @@ def test_a_user_without_rights_is_told_how_to_get_them(empty: dict[str, str]) ->
     assert "sudo" not in str(report["findings"]), "root needs none, and a small system has none"
 
 
+def test_the_disk_is_that_of_the_daemons_fault_records(tmp_path: Path, empty: dict[str, str]) -> None:
+    done = doctor("--config", GOOD, "--no-latency", "--json", HAPTICD_STATE_DIR=str(tmp_path / "state"), **empty)
+    assert str(tmp_path / "state/default/faults") in marked(reported(done), "endpoints.state")["text"]
+
+
 def test_a_file_that_cannot_be_used_is_a_problem_among_others(tmp_path: Path, empty: dict[str, str]) -> None:
     path = tmp_path / "lab.toml"
     path.write_text("[loop]\nrate_hz = 2000\n[device]\ndriver = 'omega7'\nspeed = 3\n")
@@ -187,7 +192,7 @@ def test_on_a_computer_that_tells_nothing_nothing_is_claimed(tmp_path: Path, mon
     """As in a sandbox without /proc and /sys: every check survives, and none says ok of what it could not see."""
     monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path / "run"))
     wanted = Wanted(Path("lab.toml"), LoopConfig(), "omega7", {})
-    found = {finding.check: finding for finding in Examination(wanted, "default", tmp_path, {}).findings()}
+    found = {finding.check: finding for finding in Examination(wanted, "default", tmp_path).findings()}
     for check in ("kernel.preemption", "processor.count", "processor.governor", "scheduling.throttling", "memory.swap"):
         assert found[check].mark == "unknown", found[check]
     assert not [finding for finding in found.values() if "Error" in finding.text]

@@ -137,14 +137,6 @@ def test_fault_records_need_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     says(endpoints.state(tmp_path / "not/yet/there"), mark, "free")
 
 
-def test_the_state_directory_is_systemds_or_the_users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    given = endpoints.state_directory("left", {"STATE_DIRECTORY": "/var/lib/hapticd/left"}, tmp_path)
-    assert given == Path("/var/lib/hapticd/left")
-    monkeypatch.setattr("os.geteuid", lambda: 1000)
-    assert endpoints.state_directory("left", {}, tmp_path) == tmp_path / ".local/state/hapticd/left"
-    assert endpoints.state_directory("left", {"XDG_STATE_HOME": "/s"}, tmp_path) == Path("/s/hapticd/left")
-
-
 # -- the configuration
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
+import os
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,7 @@ import pytest
 from hapticd.cli import main
 from hapticd.config.loading import parse
 from hapticd.contracts.driver import DeviceInfo
-from hapticd.contracts.errors import HapticdError
+from hapticd.contracts.errors import ConfigError, HapticdError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.contracts.record import RecordLayout
 from hapticd.control.shared import RECORDS, SharedMemory
@@ -99,6 +102,10 @@ def test_a_csv_has_every_field_of_every_tick_and_wall(tmp_path: Path) -> None:
         MAGIC,
         MAGIC + b"{",
         MAGIC + b"{}\n",
+        MAGIC + b"[]\n",
+        MAGIC + b"[" * 100_000 + b"\n",
+        content().replace(b'"timestamp"', b'"timestomp"'),
+        content().replace(b'"axes": 2', b'"axes": 2000000000000'),
         content()[:-20],
         content().replace(b"<qq", b"<qQ"),
         b"\xff" * 500,
@@ -110,6 +117,17 @@ def test_a_damaged_record_is_named_in_one_line(tmp_path: Path, damaged: bytes) -
     with pytest.raises(HapticdError, match=r"x\.fault") as raised:
         read(file)
     assert "\n" not in str(raised.value)
+
+
+def test_a_damaged_record_hides_no_other(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (path.parent / "20010101T000000.000Z-201.fault").write_bytes(MAGIC)
+    with pytest.raises(SystemExit) as ended:
+        main(["fault", "list", "--directory", str(path.parent)])
+    said = capsys.readouterr()
+    assert ended.value.code == 1
+    assert "OVER_SPEED" in said.out
+    assert said.err.startswith("hapticd: ")
+    assert "20010101T000000.000Z-201.fault" in said.err
 
 
 def test_the_oldest_record_makes_room_and_no_half_record_stays(tmp_path: Path) -> None:
@@ -186,6 +204,21 @@ def test_a_record_that_cannot_be_written_is_a_line_that_says_why(tmp_path: Path)
     assert recorder.written == 0
 
 
+def test_a_record_for_which_there_is_no_descriptor_left_does_not_end_the_daemon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = FaultRecorder(tmp_path)
+
+    def refuse(_: int) -> int:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    with closing(SharedMemory(LAYOUT, RATE_HZ)) as shared:
+        monkeypatch.setattr(os, "dup", refuse)
+        recorder.begin(EVENT, 1e9, shared, RATE_HZ, header())
+    assert recorder.turn(keep=2) == "fault record not written: Too many open files"
+    assert recorder.turn(keep=2) == ""
+
+
 def test_the_command_lists_shows_and_exports(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def hapticd(*arguments: str) -> str:
         with pytest.raises(SystemExit) as ended:
@@ -237,3 +270,5 @@ def test_a_service_keeps_its_records_where_systemd_says(tmp_path: Path, monkeypa
     assert fault_directory("left") == Path("/var/lib/hapticd/left/faults")
     monkeypatch.setenv("HAPTICD_STATE_DIR", str(tmp_path))
     assert fault_directories("left") == [tmp_path / "left" / "faults"]
+    with pytest.raises(ConfigError, match=r"instance = '\.\./left'"):
+        fault_directories("../left")

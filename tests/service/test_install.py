@@ -107,10 +107,23 @@ def test_a_live_installation_from_where_the_sandbox_cannot_look_is_refused(place
         Installation(executable=Path(place)).install(silent)
 
 
+def test_a_root_that_is_a_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / "tree").touch()
+    with pytest.raises(InstallationError, match=r"tree.*: Not a directory"):
+        installed(tmp_path / "tree")
+
+
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "usr").write_text("a file where a directory should be")
     with pytest.raises(InstallationError, match="usr/local/lib"):
         installed(tmp_path)
+
+
+def test_a_relative_executable_is_taken_from_where_one_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    installed(tmp_path / "tree", "bin/hapticd")
+    unit = (tmp_path / "tree/usr/local/lib/systemd/system/hapticd.service").read_text()
+    assert f"ExecStart={tmp_path}/bin/hapticd run" in unit
 
 
 def test_status_can_be_read_by_a_program() -> None:

@@ -18,19 +18,12 @@ from hapticd.contracts.event import EventCode
 from hapticd.contracts.record import TickRecord
 from hapticd.control.shared import RECORDS
 from tests.daemon.running import Subscriber, all_records, gone, wait_until
+from tests.daemon.test_deaths import PRESSED
 from tests.service.machine import Machine, booted, eventually, memory_of
 
 pytestmark = pytest.mark.timeout(900)  # the first machine ever has to be made
 
 CONFIG = "/etc/hapticd/hapticd.toml"
-PRESSED = """
-[device.options]
-model = "omega7"
-hand = { force = { profile = "constant", newton = -3.0 } }
-
-[[scene.walls]]
-stiffness_n_per_m = 12000.0
-"""
 SLOW_LAW = '''
 """A law that takes its time with the very first step."""
 import time

@@ -1,0 +1,73 @@
+"""A daemon at a terminal of its own: one that is closed ends it, one that is stopped does not stop it."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hapticd.commander import command
+from tests.daemon.running import HAPTICD, PATIENCE_S, wait_until
+from tests.daemon.terminal import Terminal
+
+STOP, GO_ON = b"\x13", b"\x11"
+"""Ctrl-S and Ctrl-Q."""
+RUN = (HAPTICD, "run", "--config", "lab.toml")
+
+
+@pytest.fixture
+def laboratory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "lab.toml").write_text("")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setenv("HAPTICD_STATE_DIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def terminal(laboratory: Path) -> Iterator[Terminal]:
+    """With a running daemon."""
+    terminal = Terminal(*RUN, environment={})
+    terminal.until("armed")
+    yield terminal
+    terminal.close()
+
+
+def test_the_end_of_its_terminal_is_the_end_of_a_daemon(terminal: Terminal, laboratory: Path) -> None:
+    """Whoever had it before their eyes cannot stop it any more."""
+    terminal.hang_up()
+    assert terminal.process.wait(PATIENCE_S) == 0
+    assert not list((laboratory / "default").iterdir()), "the daemon has cleaned up after itself"
+
+
+def test_at_a_terminal_too_sighup_from_a_person_is_a_reload(terminal: Terminal) -> None:
+    terminal.process.send_signal(signal.SIGHUP)
+    terminal.until("goes on")
+    assert command("status")["status"]["armed"]
+
+
+def test_a_daemon_under_nohup_outlives_its_terminal(laboratory: Path) -> None:
+    terminal = Terminal("nohup", *RUN, environment={})
+    try:
+        log = laboratory / "nohup.out"
+        wait_until(lambda: log.exists() and "armed" in log.read_text(), "the daemon to run")
+        terminal.hang_up()
+        wait_until(lambda: "goes on" in log.read_text(), "the reload that a hang-up is then")
+        assert command("status")["status"]["armed"]
+        command("stop")
+        assert terminal.process.wait(PATIENCE_S) == 0
+    finally:
+        terminal.close()
+
+
+def test_a_daemon_whose_terminal_is_stopped_still_obeys(terminal: Terminal) -> None:
+    """Its lines wait for the terminal; `hapticd disarm` at another one must not."""
+    terminal.type(STOP)
+    for _ in range(3):
+        command("disarm", timeout_s=PATIENCE_S)
+        command("arm", timeout_s=PATIENCE_S)
+    assert terminal.is_silent()
+    terminal.type(GO_ON)
+    terminal.until("disarmed")
