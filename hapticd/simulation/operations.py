@@ -6,6 +6,7 @@ would waver. Counts are those of one Python version; what C functions do inside 
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable
 from types import CodeType, FrameType
@@ -29,9 +30,13 @@ def operations_by_code(call: Callable[[], object]) -> dict[CodeType, int]:
         return each
 
     before = sys.gettrace()
+    collecting = gc.isenabled()
+    gc.disable()  # else finalizers of anything run in between and are counted
     sys.settrace(each)
     try:
         call()
     finally:
         sys.settrace(before)
+        if collecting:
+            gc.enable()
     return counts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -20,6 +19,8 @@ WINDOW_S = 0.5
 
 PROGRESS_TICKS = 2000
 """How often progress is told."""
+
+_LONGEST_S = 1e9
 
 
 class Row(NamedTuple):
@@ -102,8 +103,11 @@ class OfflineRun:
     def __init__(self, loaded: LoadedConfig, duration_s: float) -> None:
         self._period_ns = loaded.config.loop.period_ns
         self.period_s = loaded.config.loop.period_s
-        if not (math.isfinite(duration_s) and duration_s >= self.period_s):
-            raise ConfigError(f"duration = {duration_s:g} s: must be at least one period, {self.period_s:g} s")
+        if not self.period_s <= duration_s <= _LONGEST_S:
+            raise ConfigError(
+                f"duration = {duration_s:g} s: must be at least one period, {self.period_s:g} s, "
+                f"and at most {_LONGEST_S:g} s"
+            )
         self.ticks = round(duration_s / self.period_s)
         self._rehearsal = Rehearsal(fitted(loaded))
         self._tick = self._rehearsal.tick

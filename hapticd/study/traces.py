@@ -154,12 +154,12 @@ def _check_room(path: Path, rows: int) -> None:
     bytes_needed = rows * _SUFFIXES[path.suffix]
     if path.suffix == ".npz" and bytes_needed > (free := _free_memory()):
         raise ConfigError(
-            f"{path}: {rows:.7g} ticks take {_size(bytes_needed)} of memory and {_size(free)} are free; "
+            f"{path}: {rows} ticks take {_size(bytes_needed)} of memory and {_size(free)} are free; "
             "a .csv is written tick by tick"
         )
     if bytes_needed > (free := shutil.disk_usage(path.parent).free):
         raise ConfigError(
-            f"{path}: {rows:.7g} ticks take about {_size(bytes_needed)} and {_size(free)} of the disk are free"
+            f"{path}: {rows} ticks take about {_size(bytes_needed)} and {_size(free)} of the disk are free"
         )
 
 

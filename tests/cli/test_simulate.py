@@ -168,6 +168,7 @@ def test_the_summary_is_what_the_rows_say(tmp_path: Path) -> None:
     [
         (["-d", "0"], "duration = 0 s: must be at least one period, 0.001 s"),
         (["-d", "nan"], "duration = nan s"),
+        (["-d", "1e308"], "duration = 1e+308 s: must be at least one period, 0.001 s, and at most 1e+09 s"),
         (["-d", "1", "-o", "run.txt"], "run.txt: must end in .csv or .npz"),
         (["-d", "1", "-o", "nowhere/run.csv"], "nowhere/run.csv: there is no directory nowhere"),
         (["-d", "1", "-o", "old.csv"], "old.csv: exists; add --overwrite to replace it"),

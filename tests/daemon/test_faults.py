@@ -88,7 +88,8 @@ SLOW = "end = time.monotonic() + 7e-4\n        while time.monotonic() < end: pas
 def test_a_law_that_fails_is_ramped_out_with_damping(failure: str, code: EventCode, record_property: Report) -> None:
     with Rig(laws={"bad": failure}) as rig, rig.pressed().subscriber() as subscriber:
         rig.switch('\n[controller]\nlaw = "mylab.bad"\n')
-        assert faults(events_until(subscriber, code)) == [code]
+        told = faults(events_until(subscriber, code))
+        assert [each for each in told if each != EventCode.LOOP_LATE] == [code]  # a busy machine is late as well
         assert subscriber.until("hapticd/status", latched=True, armed=False)
         _, summary = rig.recorded(code)
         record_property("ticks_until_released", summary.ramp_ticks)
@@ -361,4 +362,4 @@ def rig_seq(rig: Rig) -> int:
 
 def test_a_loop_without_real_time_says_so() -> None:
     with Rig(more='[loop]\nrealtime = "off"') as rig:
-        assert "not real-time" in rig.daemon.output()
+        wait_until(lambda: "not real-time" in rig.daemon.output(), "the line in the log")

@@ -163,7 +163,7 @@ def test_an_added_key_comes_in_after_a_reload(remote: Remote) -> None:
     assert remote.local("reload", "--wait").returncode == 0
     assert remote.watch("--keys", "stranger.key_secret").returncode == 0
     assert "stranger" not in remote.daemon.output()
-    assert "refused 127.0.0." in remote.daemon.output()
+    wait_until(lambda: "refused 127.0.0." in remote.daemon.output(), "the refusal in the log")
 
 
 def test_a_reload_with_a_broken_key_file_names_it_and_changes_nothing(remote: Remote, place: Path) -> None:
