@@ -60,7 +60,10 @@ class Reload:
         if self._waiting:
             answers, self._waiting = self._waiting, []
             try:
-                self._begin(load(self._service.config.path), answers)
+                path = self._service.config.path
+                if path.is_fifo() or path.is_char_device():  # to read it would be to wait for whoever writes it
+                    raise ConfigError(f"{path}: is a pipe or a device, not a file; a running daemon reads files only")
+                self._begin(load(path), answers)
             except HapticdError as error:
                 self._refuse(str(error), answers)
         elif isinstance(saved, ConfigError):

@@ -153,12 +153,15 @@ class Service:
         now_s = time.monotonic()
         self.control.beat()
         self._publish()
-        self._obey()
-        self.reload.turn()
         if self.recovery.lost:
             self._look_for_device()
         else:
             self._look_after_loop(now_s)
+        # After it is known whether there is a device: whoever was told that it is lost may say what shall be when it is
+        # back.
+        self._obey()
+        self.reload.turn()
+        self.requests.turn()  # last, so that whoever gets an answer finds it in the status as well
         self.chronicle.turn(self.config, self.control)
         if (now_s >= self._status_due_s or self.chronicle.news) and self.exit_code is None:
             self._status_due_s = now_s + STATUS_S
@@ -194,7 +197,6 @@ class Service:
         ended = self.control.exit_code is not None
         while ended and self._publish():
             pass
-        self.requests.turn()
         if self._device_lost is not None and self.report.last is not None and not self._stopping:
             self._begin_recovery(self._device_lost, self.report.last)
         elif ended:
@@ -256,6 +258,7 @@ class Service:
         while self._publish():
             pass
         self.chronicle.recorder.loop_ended()
+        self.requests.turn()  # what the loop has still answered
         self.requests.abandon(event.text)
         why = event.text.removeprefix("device lost: ")
         report = self.report

@@ -130,6 +130,15 @@ def test_a_file_that_cannot_be_used_changes_nothing_and_names_the_place(
         assert after["armed"]
 
 
+def test_a_pipe_in_the_place_of_the_file_is_refused_and_not_waited_for(daemon: Daemon) -> None:
+    daemon.config.unlink()
+    os.mkfifo(daemon.config)
+    refused = ask(daemon, "reload", "--wait")
+    assert refused.returncode == 2
+    assert "is a pipe or a device" in refused.stderr
+    assert ask(daemon, "disarm").returncode == 0
+
+
 def test_sighup_reloads_as_well(daemon: Daemon) -> None:
     with Subscriber(daemon.endpoint) as subscriber:
         daemon.config.write_text(PRESSED + '[controller]\nlaw = "tdpa"\n')
