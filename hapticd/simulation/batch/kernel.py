@@ -231,7 +231,8 @@ def long_difference(loop: Any, params: Any, history: Any, position_m: float) -> 
         loop.filled += 1
     oldest = (loop.newest + 1 - loop.filled + size) % size
     span_s = history.time_s[loop.newest] - history.time_s[oldest]
-    return (position_m - history.position_m[oldest]) / span_s  # type: ignore[no-any-return]
+    velocity_m_per_s: float = (position_m - history.position_m[oldest]) / span_s
+    return velocity_m_per_s
 
 
 def report(plant: Any, loop: Any) -> None:
