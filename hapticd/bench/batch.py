@@ -2,7 +2,7 @@
 
     hapticd bench batch [--points 1000] [--seconds 3] [--repeats 7] [--json]
 
-The C is batch_reference.c, built when this runs with `cc -O2 -ffp-contract=off`. All are measured in turns, and the
+The C is batch_reference.c, built when this runs with -O2 -ffp-contract=off. All are measured in turns, and the
 best turn of each counts. On one core that is processor time, which other programs hardly disturb; all cores together
 are measured by the clock, so that figure means something only while the machine is otherwise idle.
 """
@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import shutil
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable
@@ -24,8 +22,8 @@ import numpy as np
 from numba import get_num_threads
 
 from hapticd import registry
+from hapticd.bench.compiling import compile_c
 from hapticd.config.models import WallConfig
-from hapticd.contracts.errors import HapticdError
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.options import SimulationOptions
 
@@ -113,17 +111,14 @@ class Reference:
     """The loop in C over the records of a batch."""
 
     def __init__(self, batch: Batch, folder: Path) -> None:
-        compiler = shutil.which("cc")
-        if compiler is None:
-            raise HapticdError("no C compiler `cc` here; install gcc or clang")
         self._batch = batch
         arrays = batch.arrays()
         header = [_struct(name, getattr(arrays, field).dtype) for name, field in _STRUCTS.items()]
         (folder / "batch_types.h").write_text("\n".join(header))
         source = Path(__file__).with_name("batch_reference.c")
-        library = folder / "batch_reference.so"
-        command = [compiler, "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-I{folder}", str(source)]
-        subprocess.run([*command, "-o", str(library), "-lm"], check=True)
+        library = compile_c(
+            source, folder / "batch_reference.so", "-ffp-contract=off", "-shared", "-fPIC", f"-I{folder}", "-lm"
+        )
         self._sweep = ctypes.CDLL(str(library)).sweep
         self._arrays = arrays
 

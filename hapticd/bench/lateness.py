@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import os
 import random
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -26,6 +25,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from hapticd.bench import Bar, Conditions, Progress, Quantiles, Verdict, Watch, doubtful, ratio
+from hapticd.bench.compiling import compile_c
 from hapticd.bench.threaded import serve_threaded
 from hapticd.bench.tick import CALM, RecordedLoop, judge_body, scene, serve_daemon
 from hapticd.contracts.errors import HapticdError, RealtimeError
@@ -216,16 +216,7 @@ def compile_witness(directory: Path) -> Path:
     Raises:
         HapticdError: there is no compiler, or it refuses.
     """
-    compiler = shutil.which(os.environ.get("CC", "cc"))
-    if compiler is None:
-        raise HapticdError("no C compiler: install one (Debian: apt install gcc), or name it in $CC")
-    program = directory / "witness"
-    built = subprocess.run(
-        [compiler, "-O2", "-o", str(program), str(_SOURCE)], capture_output=True, text=True, check=False
-    )
-    if built.returncode:
-        raise HapticdError(f"{compiler} cannot compile {_SOURCE}: {built.stderr.strip()}")
-    return program
+    return compile_c(_SOURCE, directory / "witness")
 
 
 def check_rights(witness: Path, cpu: int) -> None:

@@ -13,7 +13,6 @@ import contextlib
 import os
 import pty
 import select
-import shutil
 import signal
 import subprocess
 import tempfile
@@ -28,6 +27,7 @@ from typing import Any
 
 from hapticd import registry
 from hapticd.bench import Conditions, Progress, Quantiles, Watch, ratio
+from hapticd.bench.compiling import compile_c
 from hapticd.bench.tick.spawned import Spawned
 from hapticd.config.models import LoopConfig
 from hapticd.contracts.driver import Driver
@@ -230,18 +230,7 @@ def _line(peer: Path, what: str) -> Iterator[tuple[int, str]]:
 
 
 def _compiled(place: Path) -> Path:
-    compiler = shutil.which(os.environ.get("CC", "cc"))
-    if compiler is None:
-        raise HapticdError("no C compiler: install one (Debian: apt install gcc), or name it in $CC")
     firmware = directory("drivers") / "firmware"
     core = [firmware / "host-rig" / "host_rig.c", *sorted((firmware / "protocol").glob("*.c"))]
-    program = place / "rig_peer"
-    built = subprocess.run(
-        [compiler, "-O2", f"-I{firmware / 'host-rig'}", f"-I{firmware / 'protocol'}", "-o", program, _SOURCE, *core],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if built.returncode:
-        raise HapticdError(f"{compiler} cannot compile {_SOURCE}: {built.stderr.strip()}")
-    return program
+    folders = [f"-I{firmware / 'host-rig'}", f"-I{firmware / 'protocol'}"]
+    return compile_c(_SOURCE, place / "rig_peer", *core, *folders)

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from array import array
+from pathlib import Path
 
 import pytest
 
 from hapticd import cli, registry
 from hapticd.bench import Quantiles, tick
+from hapticd.bench.compiling import compile_c
 from hapticd.bench.tick import Body, Ticks
+from hapticd.bench.tick.memory import PAGES, MemoryReader
 from hapticd.config.loading import parse
 from hapticd.contracts.errors import HapticdError
 
@@ -32,9 +37,9 @@ def stop() -> None:
     raise Stopped
 
 
-def body(group: str, p99_us: float, problem: str = "") -> Body:
+def body(group: str, p99_us: float, problem: str = "", name: str = "some", over: float = 0.0) -> Body:
     us = Quantiles(1000, p99_us / 2, p99_us, p99_us, p99_us)
-    return Body(group, "some", us, us, p99_us * 1e-3, 1.0, 1.0, 1.0, problem)
+    return Body(group, name, us, us, p99_us * 1e-3, over, 300, 1.0, 1.0, 1.0, problem)
 
 
 class TestStopwatch:
@@ -83,8 +88,36 @@ class TestBars:
         assert tick.judge_body("x", 0.031, realtime, others).verdict == "INCONCLUSIVE"
         assert tick.judge_body("x", 0.029, realtime, others).verdict == "PASS"
 
+    @pytest.mark.parametrize(
+        ("over", "held_up", "verdict"), [(0.012, 0.001, "FAIL"), (0.012, 0.002, "INCONCLUSIVE"), (0.05, 0.03, "FAIL")]
+    )
+    def test_a_miss_that_a_c_program_which_reads_memory_shares_says_nothing(
+        self, over: float, held_up: float, verdict: str
+    ) -> None:
+        reference = body("reference", 5.0, name="memory in C", over=held_up)
+        bars = tick.judge([reference, body("law", 100.0, over=over)], realtime=True, others=0.0)
+        assert [bar.verdict for bar in bars] == [verdict]
+
+    def test_a_pass_stays_one_however_restless_the_machine(self) -> None:
+        reference = body("reference", 200.0, name="memory in C", over=0.02)
+        bars = tick.judge([reference, body("law", 29.0, over=0.009)], realtime=True, others=0.0)
+        assert [bar.verdict for bar in bars] == ["PASS"]
+
     def test_what_could_not_be_measured_is_not_judged(self) -> None:
         assert tick.judge([body("law", 0.0, problem="diverged")], realtime=True, others=0.0) == []
+
+
+class TestMemory:
+    def test_without_a_compiler_the_message_says_what_to_install(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("CC", "no-such-compiler")
+        with pytest.raises(HapticdError, match="apt install gcc"):
+            MemoryReader()
+
+    def test_a_source_that_does_not_compile_is_named(self, tmp_path: Path) -> None:
+        source = tmp_path / "broken.c"
+        source.write_text("int main(void) { return nothing; }\n")
+        with pytest.raises(HapticdError, match=r"broken\.c.*nothing"):
+            compile_c(source, tmp_path / "broken")
 
 
 class TestCases:
@@ -125,6 +158,7 @@ def test_a_daemon_that_cannot_start_says_why() -> None:
         )
 
 
+@pytest.mark.skipif(shutil.which(os.environ.get("CC", "cc")) is None, reason="no C compiler")
 def test_bench_tick_measures_every_installed_law(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         cli.main(["bench", "tick", "--quick", "--json"])
@@ -136,6 +170,9 @@ def test_bench_tick_measures_every_installed_law(capsys: pytest.CaptureFixture[s
         assert each["problem"] == ""
         assert each["paced_us"]["count"] == each["hot_us"]["count"] == 100
         assert 0.0 < each["paced_us"]["p50"] <= each["paced_us"]["p99"] <= each["paced_us"]["max"]
+    pages = {each["name"]: each["pages"] for each in report["bodies"]}
+    assert pages["memory in C"] >= PAGES
+    assert pages["energy-cycle"] - pages["empty loop"] >= 0.6 * PAGES
     assert report["bodies"][0]["p50_ratio"] == 1.0
     assert [piece["name"] for piece in report["pieces"]] == ["nothing", "read", "step", "write", "record"]
     assert all(piece["us"]["count"] == 100 for piece in report["pieces"])

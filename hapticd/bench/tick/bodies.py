@@ -10,18 +10,17 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from typing import Any
 
 from hapticd.bench import Progress, Quantiles, ratio
 from hapticd.bench.tick.block import arithmetic, nothing, run_loop, run_reference
-from hapticd.bench.tick.case import RATE_HZ, Case
+from hapticd.bench.tick.case import BAR, RATE_HZ, WARM_TICKS, Case
+from hapticd.bench.tick.memory import MemoryReader, touched_pages
 from hapticd.bench.tick.spawned import Spawned
 from hapticd.config.loading import parse
 from hapticd.config.models import LoopConfig
 from hapticd.contracts.errors import HapticdError
 from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
-
-WARM_TICKS = 60
-"""First ticks of a block that are not counted: arming, first calls."""
 
 ROUNDS = 10
 """Every case is measured in so many blocks, in a new random order each time, so that all see the same machine."""
@@ -38,6 +37,8 @@ class Body:
         paced_us: at the set rate, with the caches as a sleep leaves them: the number that counts [us].
         hot_us: back to back [us].
         of_period: p99 of `paced_us` as a share of the period.
+        over: share of the paced ticks that took more than `BAR` of the period.
+        pages: of memory that a tick touches, the counting included; 0 where the kernel does not tell.
         p50_ratio, p99_ratio, hot_ratio: next to the reference, paced and hot (p50).
         problem: why it could not be measured, empty when it could.
     """
@@ -47,6 +48,8 @@ class Body:
     paced_us: Quantiles
     hot_us: Quantiles
     of_period: float
+    over: float
+    pages: int
     p50_ratio: float
     p99_ratio: float
     hot_ratio: float
@@ -111,7 +114,19 @@ class _Samples:
         self.paced: array[int] = array("q")
         self.hot: array[int] = array("q")
         self.pieces: dict[str, list[int]] = {name: [] for name in _PIECES} if case.pieces else {}
+        self.pages = 0
         self.problem = ""
+        self._work: Callable[[], Any] = arithmetic if case.name == "arithmetic" else nothing
+        if case.name == "memory in C":
+            try:
+                self._work = MemoryReader()
+            except HapticdError as error:
+                self.problem = str(error)
+
+    def count(self) -> None:
+        """Count the pages that a tick touches."""
+        self.pages = touched_pages(lambda sleep_until: self.run(WARM_TICKS, sleep_until))
+        del self.paced[:]
 
     def run(self, ticks: int, sleep_until: Callable[[int], int] | None) -> None:
         """Measure one more block."""
@@ -123,7 +138,9 @@ class _Samples:
             if self.config is not None:
                 run_loop(self.config, spent, sleep_until, pieces)
             else:
-                run_reference(arithmetic if self.case.name == "arithmetic" else nothing, spent, sleep_until)
+                run_reference(self._work, spent, sleep_until)
+                if isinstance(self._work, MemoryReader):
+                    self._work.move()
         except HapticdError as error:
             self.problem = str(error)
             return
@@ -139,6 +156,8 @@ def _measure_bodies(connection: Connection, found: Sequence[Case], ticks: int, r
         samples = [_Samples(case) for case in found]
         for sample in samples:
             sample.run(WARM_TICKS, None)  # first calls, before memory is locked
+            if not sample.pieces:
+                sample.count()
             del sample.hot[:]
         problems, advice = become_realtime(LoopConfig())
         sleep_until = make_sleeper()
@@ -171,6 +190,8 @@ def _bodies(samples: Sequence[_Samples]) -> list[Body]:
                 paced_us=paced,
                 hot_us=hot,
                 of_period=paced.p99 * 1e-6 * RATE_HZ,
+                over=ratio(sum(spent > BAR * 1e9 / RATE_HZ for spent in sample.paced), len(sample.paced)),
+                pages=sample.pages,
                 p50_ratio=ratio(paced.p50, reference.paced_us.p50) if reference else 1.0,
                 p99_ratio=ratio(paced.p99, reference.paced_us.p99) if reference else 1.0,
                 hot_ratio=ratio(hot.p50, reference.hot_us.p50) if reference else 1.0,

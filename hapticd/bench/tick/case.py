@@ -12,6 +12,12 @@ from hapticd.share import directory
 
 RATE_HZ = 1000.0
 
+BAR = 0.03
+"""Largest share of the period that the body of a tick may take at 1 kHz, p99."""
+
+WARM_TICKS = 60
+"""First ticks of a block that are not counted: arming, first calls."""
+
 
 @dataclass(frozen=True, slots=True)
 class Case:
@@ -32,7 +38,7 @@ class Case:
 
 def cases() -> list[Case]:
     """All that there is to measure: references, installed laws, shipped simulations, numbers of walls, pieces."""
-    found = [Case("reference", "arithmetic"), Case("reference", "empty loop")]
+    found = [Case("reference", name) for name in ("arithmetic", "empty loop", "memory in C")]
     found += [Case("law", name, scene(law=name)) for name in registry.names(registry.CONTROLLERS)]
     shapes = set()
     for path in sorted(directory("config").glob("*.toml")):
