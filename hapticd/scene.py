@@ -7,8 +7,11 @@ damping, one without changes looks at no clock.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from hapticd.config.models import WallConfig
+from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.errors import ConfigError
 
 
 class Wall:
@@ -96,3 +99,30 @@ class Wall:
     def same_place(self, other: Wall) -> bool:
         """Whether the two planes coincide, so that one may turn into the other under a hand."""
         return (self.axis, self.outward, self.position_m) == (other.axis, other.outward, other.position_m)
+
+
+def compile_walls(walls: Iterable[WallConfig], info: DeviceInfo, period_s: float) -> list[Wall]:
+    """Walls on the axes of a device.
+
+    Raises:
+        ConfigError: a wall on an axis that the device has not, or on two axes of a device that has one.
+    """
+    compiled = []
+    placed = ""
+    for index, config in enumerate(walls):
+        if len(info.axes) == 1:
+            placed = placed or config.axis
+            if config.axis != placed:
+                raise ConfigError(
+                    f'scene.walls[{index}].axis = "{config.axis}": {info.model} has a single axis, and the first '
+                    f'wall has put it on "{placed}"'
+                )
+            axis = 0
+        elif config.axis in info.axes:
+            axis = info.axes.index(config.axis)
+        else:
+            raise ConfigError(
+                f'scene.walls[{index}].axis = "{config.axis}": {info.model} has only {", ".join(info.axes)}'
+            )
+        compiled.append(Wall(config, axis, period_s))
+    return compiled

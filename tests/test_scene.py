@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from hapticd.config.models import SceneConfig, WallConfig
 from hapticd.contracts.driver import DeviceInfo
 from hapticd.contracts.errors import ConfigError
-from hapticd.control.tick import compile_walls
-from hapticd.scene import Wall
+from hapticd.scene import Wall, compile_walls
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 

@@ -23,8 +23,8 @@ def calibrate(
 ) -> None:
     """Calibrate a running daemon's device, which moves its arm.
 
-    Let go of the arm and clear its workspace. Ctrl-C during the countdown calls it off. The daemon must be disarmed,
-    and goes on streaming positions.
+    Let go of the arm and clear its workspace. Ctrl-C calls it off, during the countdown and afterwards, and so does
+    `hapticd disarm`. The daemon must be disarmed, and goes on streaming positions.
 
     Example: hapticd calibrate --countdown 10
     """
@@ -33,4 +33,9 @@ def calibrate(
         typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
         time.sleep(1.0)
     typer.echo("calibrating", err=True)
-    command("calibrate", instance, TIMEOUT_S, connect, keys)
+    try:
+        command("calibrate", instance, TIMEOUT_S, connect, keys)
+    except KeyboardInterrupt:
+        command("disarm", instance, connect=connect, keys=keys)
+        typer.echo("called off", err=True)
+        raise

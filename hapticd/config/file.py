@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import stat
 import tempfile
 from pathlib import Path
 
@@ -13,13 +14,21 @@ from hapticd.contracts.errors import ConfigError
 _LARGEST = 1 << 20
 
 
-def read(path: Path | str) -> str:
+def read(path: Path | str, *, files_only: bool = False) -> str:
     """Text of a configuration file, line ends as they are.
+
+    Args:
+        path: the file.
+        files_only: refuse a pipe or a device, whose reader waits for whoever writes it.
 
     Raises:
         ConfigError: it cannot be read, or is no text.
     """
     try:
+        if files_only:
+            mode = Path(path).stat().st_mode
+            if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
+                raise ConfigError(f"{path}: is a pipe or a device, not a file; a running daemon reads files only")
         with Path(path).open("rb") as file:
             raw = file.read(_LARGEST + 1)
     except FileNotFoundError:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Generic, TypeVar
 
 from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.errors import DriverStateError
+from hapticd.contracts.errors import DriverError, DriverStateError
 from hapticd.contracts.metric import MOST_METRICS, Metric
 from hapticd.contracts.table import Table
 
@@ -79,11 +79,6 @@ class DeviceInfo:
     has_clock: bool = False
     has_sequence: bool = False
     notes: tuple[str, ...] = ()
-
-    @property
-    def detects_frozen(self) -> bool:
-        """Whether a device that repeats old data can be told from one that stands still."""
-        return self.has_clock or self.has_sequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +171,8 @@ class Driver(ABC, Generic[OptionsT]):
         self._info: DeviceInfo | None = None
         self._limit_squared = 0.0
         self._axes = 0
+        self._calibrating = False
+        self._called_off = False
 
     @classmethod
     def find(cls, options: OptionsT | None = None) -> list[FoundDevice]:
@@ -248,12 +245,28 @@ class Driver(ABC, Generic[OptionsT]):
         """Calibrate or home the device. The one call that may move an arm by itself.
 
         Raises:
-            DriverStateError: not open, or force is enabled.
+            DriverStateError: not open, force is enabled, or it was called off.
             DriverError: the device failed to calibrate.
         """
         if self.state is not DriverState.OPEN:
             raise DriverStateError(f"calibrate: the device is {self.state.value}, it must be open without force")
-        self._calibrate()
+        self._called_off = False
+        self._calibrating = True
+        try:
+            self._calibrate()
+        except DriverError as error:
+            if self._called_off:
+                raise DriverStateError("the calibration was called off") from error
+            raise
+        finally:
+            self._calibrating = False
+
+    def call_off(self) -> None:
+        """Have a calibration that is under way, in another thread, end early; returns at once and never raises."""
+        if self._calibrating:
+            self._called_off = True
+            with contextlib.suppress(Exception):  # whoever calibrates is told
+                self._call_off()
 
     def enable(self) -> None:
         """Let the device take forces; the force is zero until the first write.
@@ -302,6 +315,7 @@ class Driver(ABC, Generic[OptionsT]):
         """Take the force away, from any state, after any error; never raises."""
         if self.state is DriverState.CLOSED:
             return
+        self.call_off()
         self.state = DriverState.OPEN
         with contextlib.suppress(Exception):  # whatever the device says now, the caller is already letting go
             self._disable()
@@ -320,6 +334,12 @@ class Driver(ABC, Generic[OptionsT]):
 
     def _calibrate(self) -> None:
         """Calibrate or home; may move."""
+
+    def _call_off(self) -> None:
+        """Have `_calibrate` end with an error soon, the arm without force; called from another thread, may not wait.
+
+        Nothing to do for one that looks at `_called_off` between its own steps.
+        """
 
     @abstractmethod
     def _enable(self) -> None:

@@ -38,6 +38,8 @@ class EventCode(enum.IntEnum):
     FAULT_RECORD_FAILED = 303
     SUBSCRIBER_FLOOD = 304
     DEVICE_WARNING = 305
+    CALIBRATION_ENDED = 306
+    NOBODY_STANDS_BY = 307
 
 
 @dataclass(slots=True)

@@ -17,6 +17,7 @@ from hapticd.contracts.driver import DriverState
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import EventCode
 from hapticd.control.contact import RunningLaw
+from hapticd.control.shared import DISARM, DISARMED
 from hapticd.guard import Mode
 
 if TYPE_CHECKING:
@@ -58,14 +59,17 @@ class Letters:
             text = str(error) if isinstance(error, HapticdError) else f"{type(error).__name__}: {error}"
             shared.answer(text or type(error).__name__)
 
+    def disarm(self) -> None:
+        """Let go, whatever else is being worked off; a calibration is called off."""
+        words = self._loop.shared.words
+        asked = words[DISARM]
+        self._loop.tick.release()
+        self._loop.event(EventCode.DISARMED, "disarmed: the force is ramped to zero")
+        words[DISARMED] = asked
+
     def _do_arm(self) -> Generator[None, None, None]:
         if not self._loop.arm():
             raise HapticdError("stopped by a fault: `hapticd clear` first")
-        yield
-
-    def _do_disarm(self) -> Generator[None, None, None]:
-        self._loop.tick.release()
-        self._loop.event(EventCode.DISARMED, "disarmed: the force is ramped to zero")
         yield
 
     def _do_clear(self) -> Generator[None, None, None]:
@@ -74,7 +78,10 @@ class Letters:
         yield
 
     def _do_calibrate(self) -> Generator[None, None, None]:
-        """Calibrate beside the loop, which goes on reading; nobody arms meanwhile, since letters wait in line."""
+        """Calibrate beside the loop, which goes on reading; nobody arms meanwhile, since letters wait in line.
+
+        Who asks to disarm meanwhile wants the arm to stop.
+        """
         loop = self._loop
         if loop.tick.guard.mode is not Mode.DISARMED or loop.driver.state is not DriverState.OPEN:
             raise HapticdError("calibration moves the arm by itself: `hapticd disarm` first")
@@ -88,9 +95,15 @@ class Letters:
             except Exception as error:  # noqa: BLE001 - handed over to whoever asked
                 ended.append(error)
 
+        words = loop.shared.words
+        disarmed = words[DISARM]
         threading.Thread(target=calibrate, daemon=True).start()
         while not ended:
+            if words[DISARM] != disarmed:
+                loop.driver.call_off()
             yield
+        if ended[0] is not None:
+            loop.event(EventCode.CALIBRATION_ENDED, f"the calibration ended early: {ended[0]}")
         _raise(ended)
         loop.tick.forget_origin()
         loop.event(EventCode.CALIBRATED, "calibrated")
@@ -139,7 +152,10 @@ class Letters:
         loop.event(EventCode.SWITCHED, f"configuration {config}: {change}", law_before=was, law=law, config=config)
 
     def _import(self, name: str) -> Generator[None, None, None]:
-        """Import a law beside the loop; its ticks go on, at worst late by the switch interval."""
+        """Import a law beside the loop; its ticks go on, late by the switch interval.
+
+        Where there is no bytecode of it yet, late by as long as Python takes to compile the source: some ms.
+        """
         ended: list[Exception | None] = []
 
         def load() -> None:

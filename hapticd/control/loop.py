@@ -15,6 +15,8 @@ from hapticd.control.letters import Letters
 from hapticd.control.predecessor import NOBODY, Predecessor
 from hapticd.control.shared import (
     CONTROL_BEAT,
+    DISARM,
+    DISARMED,
     DONE,
     MAIL,
     RECORDS,
@@ -158,6 +160,7 @@ class ControlLoop:
         thread_time_ns = time.thread_time_ns
         period_ns = self.loop.period_ns
         disarmed = Mode.DISARMED
+        enabled = DriverState.ENABLED
         budget_ns = int(self.loop.law_budget * period_ns)
         all_ticks = (1 << BUDGET_TICKS) - 1
         most_late = max(BURST_TICKS, int(LATE_S * 1e9) // period_ns)
@@ -178,7 +181,7 @@ class ControlLoop:
             try:
                 sample = read()
                 force_n = step(sample, (woke_ns - last_ns) * 1e-9)
-                if guard.mode is not disarmed:
+                if driver.state is enabled:  # the zero at the end of a release as well
                     write(force_n)
                 last_ns = woke_ns
 
@@ -193,12 +196,16 @@ class ControlLoop:
             words[CONTROL_BEAT] = woke_ns
 
             if words[MAIL] != words[DONE]:
+                used_ns = thread_time_ns()
                 self.letters.work()
+                cpu_ns += thread_time_ns() - used_ns  # no law is to answer for what somebody asked for
+            if words[DISARM] != words[DISARMED]:
+                self.letters.disarm()
             if self.stop_requested and not self._stopping:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
             if guard.mode is disarmed:
-                if driver.state is DriverState.ENABLED:
+                if driver.state is enabled:
                     driver.disable()
                 if self._stopping:
                     return

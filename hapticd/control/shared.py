@@ -26,8 +26,9 @@ from hapticd.contracts.record import RecordLayout, TickRecord
 HISTORY_S = 8.0
 """How much of the past the ring of records holds [s]."""
 
-RECORDS, CONTROL_BEAT, SUPERVISOR_BEAT, MAIL, MAIL_LENGTH, DONE, EVENTS, SKIPPED = range(8)
-"""Words: records written, heartbeats [ns], letters sent, their length, letters answered, events, skipped deadlines."""
+RECORDS, CONTROL_BEAT, SUPERVISOR_BEAT, MAIL, MAIL_LENGTH, DONE, EVENTS, SKIPPED, DISARM, DISARMED = range(10)
+"""Words: records written, heartbeats [ns], letters sent, their length, letters answered, events, skipped deadlines, and
+how often disarming was asked for and done, which waits behind no letter."""
 
 _METRICS = 2048
 _VERDICT = 4096
@@ -117,7 +118,7 @@ class SharedMemory:
 
     def answer(self, verdict: str) -> None:
         """Answer it (control side): "" is done, anything else says why not."""
-        row = verdict.encode()[: _MAILBOX - _VERDICT - 8]
+        row = verdict.encode(errors="replace")[: _MAILBOX - _VERDICT - 8]
         self.view[_VERDICT : _VERDICT + 8] = len(row).to_bytes(8, "little")
         self.view[_VERDICT + 8 : _VERDICT + 8 + len(row)] = row
         self.words[DONE] = self.words[MAIL]

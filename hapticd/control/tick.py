@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
-from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig, WallConfig
+from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
 from hapticd.contracts.driver import DeviceInfo, Sample
 from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.event import EventCode
@@ -17,7 +17,7 @@ from hapticd.control import fallback
 from hapticd.control.contact import Contact, RunningLaw
 from hapticd.energy import EnergyLedger
 from hapticd.guard import BLIND_RAMP_S, Guard, Mode, limits
-from hapticd.scene import Wall
+from hapticd.scene import Wall, compile_walls
 from hapticd.velocity import Estimator, make_estimator
 
 FROZEN_TICKS = 20
@@ -40,33 +40,6 @@ _MODE_FLAGS = (0, int(Flag.ARMED), int(Flag.RELEASING))  # in the order of guard
 _LIMITED = int(Flag.LIMITED)
 _LATCHED = int(Flag.LATCHED)
 _FALLBACK = int(Flag.FALLBACK)
-
-
-def compile_walls(walls: Iterable[WallConfig], info: DeviceInfo, period_s: float) -> list[Wall]:
-    """Walls on the axes of a device.
-
-    Raises:
-        ConfigError: a wall on an axis that the device has not, or on two axes of a device that has one.
-    """
-    compiled = []
-    placed = ""
-    for index, config in enumerate(walls):
-        if len(info.axes) == 1:
-            placed = placed or config.axis
-            if config.axis != placed:
-                raise ConfigError(
-                    f'scene.walls[{index}].axis = "{config.axis}": {info.model} has a single axis, and the first '
-                    f'wall has put it on "{placed}"'
-                )
-            axis = 0
-        elif config.axis in info.axes:
-            axis = info.axes.index(config.axis)
-        else:
-            raise ConfigError(
-                f'scene.walls[{index}].axis = "{config.axis}": {info.model} has only {", ".join(info.axes)}'
-            )
-        compiled.append(Wall(config, axis, period_s))
-    return compiled
 
 
 class ControlTick:
@@ -142,6 +115,7 @@ class ControlTick:
         self._time_ns = -1
         self._sequence = -1
         self._frozen = 0
+        self._waited_s = 0.0
         self._blind = True
         self._excused = False
         self._blind_gain = 0.0
@@ -257,14 +231,6 @@ class ControlTick:
         for contact, _ in asked:
             self._blend(contact)
 
-    def switch_law(self, make_law: Callable[[], RunningLaw]) -> None:
-        """Put a law on every wall, as `switch` does."""
-        self.switch(make_law=make_law)
-
-    def switch_scene(self, scene: SceneConfig) -> None:
-        """Put other walls in place, as `switch` does."""
-        self.switch(scene)
-
     def release(self, ramp_s: float | None = None) -> None:
         """Ramp the force to zero and stay disarmed."""
         self.guard.release(self.ramp_s if ramp_s is None else ramp_s)
@@ -358,9 +324,13 @@ class ControlTick:
             frozen = dt_s <= 0.0
             self._time_ns = sample.time_ns
         else:
-            dt_s = clock_dt_s
             frozen = self._has_sequence and sample.sequence == self._sequence
             self._sequence = sample.sequence
+            # The same sample once more: as on a device's own clock, time stands still until there is news.
+            self._waited_s += clock_dt_s
+            dt_s = 0.0 if frozen else self._waited_s
+            if not frozen:
+                self._waited_s = 0.0
         if frozen:
             self._frozen += 1
             if self._frozen >= FROZEN_TICKS and self.guard.mode is Mode.ARMED:

@@ -63,6 +63,7 @@ class Control:
         self.reader = RecordReader(self.shared)
         self.events = EventReader(self.shared)
         self.stall_s = max(STALL_S, 10.0 * config.config.loop.period_s)
+        self._dropped = (0, 0)
         self._still_s = 0.0
         self._written = 0
         self._looked_s = time.monotonic()
@@ -76,6 +77,12 @@ class Control:
     def skipped(self) -> int:
         """Deadlines skipped since the daemon started."""
         return self.shared.words[SKIPPED]
+
+    def newly_dropped(self) -> tuple[int, int]:
+        """Ticks and events that were overwritten before they were fetched, since this was asked last."""
+        ticks, events = self._dropped
+        self._dropped = (self.reader.dropped, self.events.dropped)
+        return self.reader.dropped - ticks, self.events.dropped - events
 
     def beat(self) -> None:
         """Show the loop that the supervisor lives."""
@@ -102,9 +109,9 @@ class Control:
         with contextlib.suppress(ProcessLookupError):
             self.process.terminate()
 
-    def end(self) -> None:
-        """Let the loop ramp its force out and end; kill it when it does not."""
-        end(self.process)
+    def end(self) -> bool:
+        """Let the loop ramp its force out and end; kill it when it does not, and return False."""
+        return end(self.process)
 
     def kill(self) -> None:
         """End the process at once, whatever it is doing."""
@@ -115,14 +122,16 @@ class Control:
         self.shared.close()
 
 
-def end(process: subprocess.Popen[bytes]) -> None:
-    """Let a control process ramp its force out and end; kill it when it does not."""
+def end(process: subprocess.Popen[bytes]) -> bool:
+    """Let a control process ramp its force out and end; kill it when it does not, and return False."""
     with contextlib.suppress(ProcessLookupError):
         process.terminate()
     try:
         process.wait(END_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         kill(process)
+        return False
+    return True
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:

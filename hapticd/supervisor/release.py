@@ -27,6 +27,11 @@ READY_TIMEOUT_S = 10.0
 TIMEOUT_S = 2.0
 """How long the device may take to let go [s]."""
 
+_NOBODY = (
+    "nobody stands by to take the force away should the control loop die: the process for it did not start, or was "
+    "ended; restart hapticd"
+)
+
 
 class Release:
     """A helper that stands by.
@@ -40,14 +45,23 @@ class Release:
         self._helper = _start(config)
         self._ready = False
 
-    def wait_ready(self) -> bool:
-        """Return when the helper stands by, or False when it does not get there."""
+    @property
+    def problem(self) -> str:
+        """Why the force would not be taken away at once, a line for people; "" while the helper stands by."""
+        return "" if self._helper.poll() is None and self.wait_ready(0.0) else _NOBODY
+
+    def wait_ready(self, timeout_s: float = READY_TIMEOUT_S) -> bool:
+        """Return when the helper stands by, or False when it does not get there.
+
+        Args:
+            timeout_s: how long it may take [s].
+        """
         output = self._helper.stdout
         assert output is not None
         if not self._ready:
             waiting = select.poll()
             waiting.register(output, select.POLLIN)
-            self._ready = bool(waiting.poll(READY_TIMEOUT_S * 1e3)) and bool(output.read(1))
+            self._ready = bool(waiting.poll(timeout_s * 1e3)) and bool(output.read(1))
         return self._ready
 
     def release(self) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from hapticd.config.loading import LoadedConfig, load
+from hapticd.config.file import read
+from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.problems import key_path, shown_value
 from hapticd.contracts.errors import ConfigError, HapticdError
 from hapticd.contracts.event import EventCode
@@ -61,9 +62,7 @@ class Reload:
             answers, self._waiting = self._waiting, []
             try:
                 path = self._service.config.path
-                if path.is_fifo() or path.is_char_device():  # to read it would be to wait for whoever writes it
-                    raise ConfigError(f"{path}: is a pipe or a device, not a file; a running daemon reads files only")
-                self._begin(load(path), answers)
+                self._begin(parse(read(path, files_only=True), str(path)), answers)
             except HapticdError as error:
                 self._refuse(str(error), answers)
         elif isinstance(saved, ConfigError):

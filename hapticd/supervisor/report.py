@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import hapticd
+from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.contracts.record import Flag, TickRecord
+from hapticd.guard import limits
 from hapticd.supervisor.metrics import values_of
 from hapticd.supervisor.walls import WallTimes
 from hapticd.telemetry.status import LateHistogram, Status
@@ -17,6 +20,8 @@ from hapticd.telemetry.wire import timestamp_s
 
 if TYPE_CHECKING:
     from hapticd.config.loading import LoadedConfig
+    from hapticd.config.models import SafetyConfig
+    from hapticd.contracts.driver import DeviceInfo
     from hapticd.control.predecessor import Predecessor
     from hapticd.supervisor.controlled import Control
     from hapticd.supervisor.recovery import Recovery
@@ -31,6 +36,7 @@ class Report:
     Args:
         instance: name of the daemon's instance.
         epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
+        file: the configuration, by its absolute path: the working directory may go while the daemon runs.
 
     Attributes:
         last: the newest tick, None before the first.
@@ -38,7 +44,7 @@ class Report:
         status: as it was made last.
     """
 
-    def __init__(self, instance: str, epoch_offset_ns: int) -> None:
+    def __init__(self, instance: str, epoch_offset_ns: int, file: Path) -> None:
         self.last: TickRecord | None = None
         self._flags = 0
         self._law = 0
@@ -46,10 +52,12 @@ class Report:
         self.status = Status()
         self._instance = instance
         self._offset_ns = epoch_offset_ns
+        self._file = file
         self._late = LateHistogram()
         self._busy_max_us = 0.0
         self._ticks = 0
-        self._dropped = 0
+        self._ticks_dropped = 0
+        self._events_dropped = 0
         self._rate_from = (time.monotonic(), 0)
         self._fault: Event | None = None
         self._origin_m: dict[str, float] = {}
@@ -74,9 +82,10 @@ class Report:
         self._flags = Flag.LATCHED if before.latched else 0
         self._law = before.law
 
-    def add_dropped(self, ticks: int) -> None:
-        """Count ticks that were overwritten before they were fetched."""
-        self._dropped += ticks
+    def add_dropped(self, ticks: int, events: int) -> None:
+        """Count ticks and events that were overwritten before they were fetched."""
+        self._ticks_dropped += ticks
+        self._events_dropped += events
 
     def add_event(self, event: Event) -> None:
         """Remember the last fault, and where positions count from."""
@@ -90,8 +99,18 @@ class Report:
         """Whether positions count from elsewhere than the device does."""
         return any(self._origin_m.values())
 
-    def make(self, config: LoadedConfig, control: Control, recovery: Recovery, fault_records: int) -> Status:
-        """The status as it is now."""
+    def make(
+        self, config: LoadedConfig, control: Control, recovery: Recovery, fault_records: int, problem: str
+    ) -> Status:
+        """The status as it is now.
+
+        Args:
+            config: what is in force.
+            control: the loop.
+            recovery: knows whether there is a device.
+            fault_records: written so far.
+            problem: what stands and should be known, a line; "" when there is nothing.
+        """
         self._measure_rate()
         settings = config.config
         info = control.info
@@ -100,8 +119,6 @@ class Report:
         seq = self.last.seq if self.last else 0
         self._walls.take(settings.scene.walls, seq)
         flags = self._flags
-        limit_n = settings.safety.max_force_n or info.max_force_n
-        lifted = settings.safety.profile == "simulation" or limit_n == math.inf
         self.status = Status(
             version=hapticd.__version__,
             instance=self._instance,
@@ -112,7 +129,8 @@ class Report:
             late_histogram=tuple(self._late.counts),
             late_max_us=self._late.max_us,
             busy_max_us=self._busy_max_us,
-            ring_drops=self._dropped,
+            ring_drops=self._ticks_dropped,
+            event_drops=self._events_dropped,
             armed=bool(flags & Flag.ARMED),
             fallback=bool(flags & Flag.FALLBACK),
             releasing=bool(flags & Flag.RELEASING),
@@ -128,14 +146,19 @@ class Report:
             accuracy=_accuracy(control.accuracy, control.fitted_hash, config.hash),
             axes=info.axes,
             origin_m=tuple(self._origin_m.get(f"origin_{axis}_m", 0.0) for axis in info.axes),
-            max_force_n=0.0 if lifted else limit_n,
+            max_force_n=_largest_force_n(settings.safety, info),
             wall_axis=tuple(wall.axis for wall in settings.scene.walls),
             wall_position_m=tuple(wall.position_m for wall in settings.scene.walls),
             wall_stiffness_n_per_m=self._walls.stiffness_n_per_m(seq, settings.loop.period_s),
-            config_file=str(config.path.absolute()),
+            config_file=str(self._file),
             config_hash=config.hash,
             realtime=control.realtime,
-            warnings=(*((_missing(recovery),) if recovery.lost else ()), *control.warnings, *info.notes),
+            warnings=(
+                *((_missing(recovery),) if recovery.lost else ()),
+                *((problem,) if problem else ()),
+                *control.warnings,
+                *info.notes,
+            ),
             device_lost_timestamp=self._epoch_s(recovery.lost_s) if recovery.lost else 0.0,
             next_try_timestamp=self._epoch_s(recovery.next_try_s) if recovery.lost else 0.0,
             fault_code=self._fault.code if self._fault else 0,
@@ -154,6 +177,16 @@ class Report:
 
     def _epoch_s(self, monotonic_s: float) -> float:
         return timestamp_s(round(monotonic_s * 1e9), self._offset_ns)
+
+
+def _largest_force_n(safety: SafetyConfig, info: DeviceInfo) -> float:
+    """Largest magnitude that the guard lets through [N]; 0 when there is no limit."""
+    try:
+        max_force_n, max_axis_n, _ = limits(safety, info)
+    except ConfigError:  # taken over while the device was gone; it is refused when it is back
+        max_force_n = max_axis_n = info.max_force_n
+    limit_n = min(max_force_n, math.sqrt(len(info.axes)) * max_axis_n)
+    return limit_n if limit_n < math.inf else 0.0
 
 
 def _accuracy(reason: str, fitted_hash: str, hash_now: str) -> str:

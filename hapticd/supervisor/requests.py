@@ -1,4 +1,4 @@
-"""Requests to the loop, one at a time and in order: the mailbox holds a single letter."""
+"""Requests to the loop, one at a time and in order: the mailbox holds a single letter. Disarming waits behind none."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticd.contracts.errors import HapticdError
-from hapticd.control.shared import DONE, MAIL, SharedMemory
+from hapticd.control.shared import DISARM, DISARMED, DONE, MAIL, SharedMemory
 
 MOST_WAITING = 100
 
@@ -26,21 +26,45 @@ class Requests:
         self._shared = shared
         self._waiting: deque[tuple[dict[str, Any], Answer]] = deque()
         self._posted: Answer | None = None
+        self._calibrating = False
+        self._disarming: list[Answer] = []
 
     def submit(self, letter: dict[str, Any], answer: Answer) -> None:
-        """Queue a letter; its answer comes from a later `turn`."""
-        if len(self._waiting) >= MOST_WAITING:
+        """Queue a letter; its answer comes from a later `turn`.
+
+        During a calibration, which takes as long as it takes, all are refused: nobody who has given up waiting is to
+        find the device armed afterwards.
+        """
+        if self._calibrating:
+            answer("the device is calibrating: wait, or call it off with `hapticd disarm`")
+        elif len(self._waiting) >= MOST_WAITING:
             answer("too many requests are waiting for the loop; try again")
         else:
             self._waiting.append((letter, answer))
 
+    def disarm(self, answer: Answer) -> None:
+        """Have the loop let go at its next tick; a calibration is called off, and what was to arm later does not."""
+        self._shared.words[DISARM] += 1
+        self._disarming.append(answer)
+        waiting, self._waiting = self._waiting, deque()
+        for letter, other in waiting:
+            if letter["do"] in ("arm", "calibrate"):
+                other("disarmed meanwhile")
+            else:
+                self._waiting.append((letter, other))
+
     def turn(self) -> None:
-        """Hand out the answer that has come, and post the next letter."""
+        """Hand out the answers that have come, and post the next letter."""
         words = self._shared.words
+        if self._disarming and words[DISARMED] == words[DISARM]:
+            answers, self._disarming = self._disarming, []
+            for answer in answers:
+                answer("")
         if self._posted is not None:
             if words[DONE] != words[MAIL]:
                 return
             answer, self._posted = self._posted, None
+            self._calibrating = False
             answer(self._shared.verdict())
         if self._waiting:
             letter, answer = self._waiting.popleft()
@@ -50,13 +74,20 @@ class Requests:
                 answer(str(error))
             else:
                 self._posted = answer
+                if letter["do"] == "calibrate":
+                    self._calibrating = True
+                    waiting, self._waiting = self._waiting, deque()
+                    for other, its_answer in waiting:
+                        self.submit(other, its_answer)
 
     def abandon(self, why: str) -> None:
         """Answer all that wait: the loop is gone."""
-        answers = [answer for _, answer in self._waiting]
+        answers = self._disarming + [answer for _, answer in self._waiting]
         if self._posted is not None:
             answers.insert(0, self._posted)
         self._posted = None
+        self._calibrating = False
+        self._disarming = []
         self._waiting.clear()
         for answer in answers:
             answer(why)

@@ -31,15 +31,28 @@ from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.wire import measure_epoch_offset_ns
 
 DRAIN_S = 0.01
-"""How often tick records are fetched and published [s]."""
+"""How often tick records are fetched and published, at least [s]."""
+
+WAKE_NS = 4_000_000
+"""How late a turn may come without a tick waiting for longer than the telemetry promises [ns]."""
 
 STATUS_S = 1.0
 STOP_TIMEOUT_S = 3.0
+"""How long the loop may take to ramp the force out and to let go of the device [s]."""
+
 RECORD_TIMEOUT_S = 3.0
 """How long the end of the daemon waits for a fault record that is being written [s]."""
 
 KNOWN = ("status", "arm", "disarm", "calibrate", "tare", "clear", "reload", "stop")
 """What the control socket understands."""
+
+
+_FORCES = Flag.ARMED | Flag.RELEASING
+
+
+def pause_s(flush_due_ns: int | None, now_ns: int) -> float:
+    """How long to sleep until the next turn, which comes early when ticks wait to be sent [s]."""
+    return DRAIN_S if flush_due_ns is None else max(0.0, min(DRAIN_S, (flush_due_ns - WAKE_NS - now_ns) * 1e-9))
 
 
 def _nobody(_verdict: str) -> None:
@@ -65,6 +78,7 @@ class Service:
         self.config = config
         self.instance = instance
         self.notifier = Notifier()
+        self.exit_code: int | None = None
         self._terminal = Terminal()
         offset_ns = measure_epoch_offset_ns()
         ring = key_ring(config)
@@ -73,9 +87,9 @@ class Service:
             undo.callback(self.lock.close)
             self.release = Release(config)
             undo.callback(self.release.close)
+            self.release.wait_ready()  # before there can be a force to take away; that nobody stands by is told later
             self.control = Start(config).wait()
             undo.callback(self._end_control)
-            self.release.wait_ready()
             self.publisher = Publisher(
                 config.config.telemetry, self.lock.directory / TELEMETRY, self.control.info, offset_ns, ring
             )
@@ -84,14 +98,13 @@ class Service:
             undo.callback(self.commands.close)
             self.requests = Requests(self.control.shared)
             self.recovery = Recovery()
-            self.report = Report(instance, offset_ns)
+            self.report = Report(instance, offset_ns, config.path.absolute())
             self.chronicle = Chronicle(instance, self.publisher, self.report, fault_directory(instance), offset_ns)
             self.reload = Reload(self)
             undo.callback(self.reload.close)
             self._undo = undo.pop_all()
-        self.exit_code: int | None = None
         self._device_lost: Event | None = None
-        self._dropped_told = 0
+        self._problem = ""
         self._status_due_s = 0.0
         self._stopping = False
         self._stop_by_s = 0.0
@@ -113,7 +126,9 @@ class Service:
         self._status_due_s = 0.0
 
     def _end_control(self) -> None:
-        self.control.end()
+        """See that nobody holds a force any more, whatever the daemon ends for."""
+        if not self.control.end() and self.exit_code != 1:  # else it has been seen to
+            log.error("the control loop did not end and was killed; %s", self.release.release())
         self.control.close()
 
     async def _serve(self) -> int:
@@ -142,7 +157,7 @@ class Service:
             log.warning("%s", note)
         while self.exit_code is None:
             self._turn()
-            await asyncio.sleep(DRAIN_S)
+            await asyncio.sleep(pause_s(self.publisher.flush_due_ns, time.monotonic_ns()))
         self.recovery.stop()
         self.requests.abandon("the daemon has stopped")
         self.chronicle.close(self.config, self.control, RECORD_TIMEOUT_S)
@@ -163,6 +178,8 @@ class Service:
         self.reload.turn()
         self.requests.turn()  # last, so that whoever gets an answer finds it in the status as well
         self.chronicle.turn(self.config, self.control)
+        if now_s >= self._status_due_s:
+            self._look_after_helper()
         if (now_s >= self._status_due_s or self.chronicle.news) and self.exit_code is None:
             self._status_due_s = now_s + STATUS_S
             self.chronicle.news = False
@@ -180,23 +197,25 @@ class Service:
             if before is None or (before.flags ^ records[-1].flags) & ~Flag.LIMITED:
                 self._status_due_s = 0.0
         self.publisher.publish(records)
-        self.publisher.flush(time.monotonic_ns())
+        self.publisher.flush(time.monotonic_ns() + WAKE_NS)
         for event in self.control.events.read():
             self.chronicle.tell(event, self.config, self.control)
             if event.code in (EventCode.DEVICE_LOST, EventCode.DEVICE_FAULT):
                 self._device_lost = event
                 self.control.stall_s = END_TIMEOUT_S
-        dropped = self.control.reader.dropped
-        if dropped > self._dropped_told:
-            lost, self._dropped_told = dropped - self._dropped_told, dropped
-            self.report.add_dropped(lost)
-            self._tell_now(EventCode.RING_DROPPED, f"{lost} ticks were overwritten before they were published")
+        ticks, events = self.control.newly_dropped()
+        self.report.add_dropped(ticks, events)
+        for lost, what in ((ticks, "ticks"), (events, "events")):
+            if lost:
+                self._tell_now(EventCode.RING_DROPPED, f"{lost} {what} were overwritten before they were published")
         return len(records)
 
     def _look_after_loop(self, now_s: float) -> None:
         ended = self.control.exit_code is not None
         while ended and self._publish():
             pass
+        if self._stopping and not (self.report.last and self.report.last.flags & _FORCES):
+            self.control.stall_s = STOP_TIMEOUT_S  # without a force, and a driver may take its time to let go
         if self._device_lost is not None and self.report.last is not None and not self._stopping:
             self._begin_recovery(self._device_lost, self.report.last)
         elif ended:
@@ -205,6 +224,12 @@ class Service:
             self._control_lost(f"the control loop stood still for more than {self.control.stall_s:g} s")
         elif self._stopping and now_s > self._stop_by_s:
             self._control_lost(f"the control loop did not stop within {STOP_TIMEOUT_S:g} s")
+
+    def _look_after_helper(self) -> None:
+        """Tell when nobody stands by to take the force away; the status says so as long as it is so."""
+        before, self._problem = self._problem, self.release.problem if self.exit_code is None else ""
+        if self._problem and not before:
+            self._tell_now(EventCode.NOBODY_STANDS_BY, self._problem)
 
     def _look_for_device(self) -> None:
         """Try again when it is time; that nothing ticks meanwhile is no reason for systemd to intervene."""
@@ -215,7 +240,6 @@ class Service:
         self.control.close()
         self.control = control
         self.requests = Requests(control.shared)
-        self._dropped_told = 0
         self.report.expect(self.recovery.before)
         away_s = time.monotonic() - self.recovery.lost_s
         self._tell_now(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)
@@ -279,7 +303,9 @@ class Service:
                     reply(True, status=self.report.status.as_map())
                 case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if self.recovery.lost:
                     self._obey_without_device(do, reply)
-                case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do:
+                case "disarm":
+                    self.requests.disarm(_answering(reply))
+                case "arm" | "calibrate" | "tare" | "clear" as do:
                     self.requests.submit({"do": do}, _answering(reply))
                 case "reload" if request.get("wait"):
                     self.reload.ask(_answering(reply))
@@ -306,7 +332,8 @@ class Service:
                 reply(True)
 
     def _publish_status(self) -> None:
-        status = self.report.make(self.config, self.control, self.recovery, self.chronicle.recorder.written)
+        written = self.chronicle.recorder.written
+        status = self.report.make(self.config, self.control, self.recovery, written, self._problem)
         self.publisher.status(status.as_map())
         doing = f"no device: {self.recovery.why}" if self.recovery.lost else f"{self.report.rate_hz:.0f} Hz"
         self.notifier.send(f"STATUS={doing}, law {status.law}")

@@ -124,11 +124,6 @@ class Publisher:
             raise
 
     @property
-    def subscription_fd(self) -> int:
-        """Becomes readable when `service` may have something to do; edge-triggered, as ZeroMQ has it."""
-        return int(self._socket.getsockopt(zmq.FD))
-
-    @property
     def flush_due_ns(self) -> int | None:
         """When `flush` has something to send [ns of CLOCK_MONOTONIC]; None while no tick waits."""
         return self._batch_due_ns
@@ -174,7 +169,7 @@ class Publisher:
         """Send the ticks that wait, when the oldest has waited 20 ms.
 
         Args:
-            now_ns: CLOCK_MONOTONIC [ns].
+            now_ns: CLOCK_MONOTONIC, and as much more as the next call may come too late [ns].
         """
         if self._batch_due_ns is not None and now_ns >= self._batch_due_ns:
             self._send_batch()

@@ -57,6 +57,7 @@ class Status:
         late_max_us: the latest of them [us].
         busy_max_us: the longest tick body [us].
         ring_drops: ticks that the supervisor was too slow to fetch.
+        event_drops: events that it was too slow to fetch.
         armed: forces are let through.
         fallback: the law failed, damping stands in for it.
         releasing: the force is being ramped out.
@@ -105,6 +106,7 @@ class Status:
     late_max_us: float = 0.0
     busy_max_us: float = 0.0
     ring_drops: int = 0
+    event_drops: int = 0
     armed: bool = False
     fallback: bool = False
     releasing: bool = False

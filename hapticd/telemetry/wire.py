@@ -10,12 +10,13 @@ import enum
 import math
 import time
 from collections.abc import Iterator, Mapping
+from struct import Struct
 from typing import Any, Protocol
 
 import msgpack
 
 from hapticd.contracts.event import Event
-from hapticd.contracts.record import TickRecord
+from hapticd.contracts.record import TickRecord, WallRecord
 
 SCHEMA = 1
 """Version of the contract; goes up only when a key changes its meaning or goes, which clients must notice."""
@@ -144,22 +145,32 @@ def input_map(record: TickRecord, timestamp: float, inputs: Inputs) -> Map:
 
 
 class Cycles:
-    """Sees from one record to the next which walls completed a cycle."""
+    """Sees from one record to the next which walls completed a cycle.
+
+    A reload may put a wall in another one's place. So a cycle counts as seen when any wall had it in the record before,
+    number and figures the same to the last bit: each of those stands for one wall now.
+    """
 
     def __init__(self) -> None:
-        self._seen: list[int] = []
+        self._last: list[bytes] = []
 
     def completed(self, record: TickRecord) -> Iterator[tuple[int, int]]:
         """Wall and number of each cycle that ended in this record; records must come in order."""
-        walls = record.walls
-        if len(walls) != len(self._seen):
-            self._seen = (self._seen + [0] * len(walls))[: len(walls)]
-        for index, wall in enumerate(walls):
-            cycle = wall.cycle
-            if cycle != self._seen[index]:
-                self._seen[index] = cycle
-                if cycle > 0:
-                    yield index, cycle
+        before, self._last = self._last, [_cycle(wall) for wall in record.walls]
+        if self._last == before:
+            return
+        left = list(before)
+        changed = []
+        for index, cycle in enumerate(self._last):
+            if index < len(before) and cycle == before[index]:
+                left.remove(cycle)
+            else:
+                changed.append(index)
+        for index in changed:
+            if self._last[index] in left:
+                left.remove(self._last[index])
+            elif record.walls[index].cycle > 0:
+                yield index, record.walls[index].cycle
 
 
 def cycle_map(record: TickRecord, timestamp: float, wall: int) -> Map:
@@ -202,6 +213,14 @@ def plain_map(fields: Mapping[str, Any]) -> Map:
 def new_packer() -> msgpack.Packer:
     """A packer to keep: making one costs more than packing a batch."""
     return msgpack.Packer(use_bin_type=True, unicode_errors="replace")
+
+
+_CYCLE = Struct("<qddd")
+
+
+def _cycle(wall: WallRecord) -> bytes:
+    """The last cycle of a wall, for comparison; in bytes a NaN is equal to itself."""
+    return _CYCLE.pack(wall.cycle, wall.cycle_energy_j, wall.cycle_generated_j, wall.cycle_duration_s)
 
 
 def _plain(value: Any, key: str, invalid: list[str]) -> Any:

@@ -10,7 +10,7 @@ from hapticd.contracts.event import Event
 from hapticd.contracts.record import RecordLayout
 from hapticd.control.loop import ControlLoop
 from hapticd.control.process import make_tick
-from hapticd.control.shared import DONE, MAIL, EventReader, SharedMemory
+from hapticd.control.shared import DISARM, DISARMED, DONE, MAIL, EventReader, SharedMemory
 from hapticd.control.tick import ControlTick
 from hapticd.guard import Mode
 
@@ -44,11 +44,20 @@ class Bench:
 
     def ask(self, **letter: Any) -> str:
         """The verdict, once the letter is worked off, a slice a tick."""
+        if letter["do"] == "disarm":
+            self.shared.words[DISARM] += 1
+            self.loop.letters.disarm()
+            return "" if self.shared.words[DISARMED] == self.shared.words[DISARM] else "still armed"
         self.shared.post(letter)
-        while self.shared.words[MAIL] != self.shared.words[DONE]:
+        while not self.answered:
             self.ticks(1)
             self.loop.letters.work()
         return self.shared.verdict()
+
+    @property
+    def answered(self) -> bool:
+        """Whether no letter waits for its verdict."""
+        return self.shared.words[MAIL] == self.shared.words[DONE]
 
     def close(self) -> None:
         self.driver.close()

@@ -42,9 +42,14 @@ def law(
     return module
 
 
+def returns(value: Any) -> Step:
+    """A step that always returns this."""
+    return lambda _state, _params, _tick: value
+
+
 def pushes(newton: float) -> ModuleType:
     """A law that asks for the same force in every contact."""
-    return law(lambda _state, _params, _tick: newton)
+    return law(returns(newton))
 
 
 def wall(stiffness_n_per_m: float = 2000.0, axis: str = "z", **keys: Any) -> dict[str, Any]:

@@ -153,7 +153,7 @@ def test_check_says_which_model_and_why(tmp_path: Path, capsys: pytest.CaptureFi
     assert json.loads(capsys.readouterr().out)[0]["accuracy"].startswith("exact step without")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     keys=st.fixed_dictionaries(
         {

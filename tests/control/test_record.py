@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hapticd.config.models import MAX_WALLS
 from hapticd.contracts.record import Flag, RecordLayout, TickRecord, WallRecord
 
-REPEATABLE = settings(derandomize=True, deadline=None)
+REPEATABLE = settings(derandomize=True)
 
 WHOLE = st.integers(-(2**63), 2**63 - 1)
 REAL = st.floats(allow_nan=False)

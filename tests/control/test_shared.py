@@ -125,7 +125,9 @@ def test_no_record_is_torn_and_every_loss_is_counted_at_full_speed(shared: Share
         assert reader.dropped > 0
 
 
-def test_a_record_that_is_overwritten_while_it_is_copied_is_dropped(shared: SharedMemory) -> None:
+def test_a_record_that_is_overwritten_while_it_is_copied_is_dropped(
+    shared: SharedMemory, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The copy is looked at only after the counter has been looked at again."""
     reader = RecordReader(shared)
     write(shared, 700)
@@ -136,7 +138,7 @@ def test_a_record_that_is_overwritten_while_it_is_copied_is_dropped(shared: Shar
             write(shared, 5)
             return row
 
-    reader._area = Overtaken()  # type: ignore[assignment]
+    monkeypatch.setattr(reader, "_area", Overtaken())
     records = reader.read()
     assert all(map(whole, records))
     assert len(records) + reader.dropped == 700
@@ -170,7 +172,9 @@ def test_of_more_events_than_fit_the_newest_are_read_and_the_others_counted(shar
     assert reader.read() == []
 
 
-def test_an_event_that_is_overwritten_while_it_is_read_is_dropped(shared: SharedMemory) -> None:
+def test_an_event_that_is_overwritten_while_it_is_read_is_dropped(
+    shared: SharedMemory, monkeypatch: pytest.MonkeyPatch
+) -> None:
     reader = EventReader(shared)
     for number in range(250):
         shared.write_event(event(number))
@@ -185,7 +189,7 @@ def test_an_event_that_is_overwritten_while_it_is_read_is_dropped(shared: Shared
                     shared.write_event(event(1000, "later " * 50))
                 return row
 
-    reader._shared = Overtaking()  # type: ignore[assignment]
+    monkeypatch.setattr(reader, "_shared", Overtaking())
     events = reader.read()
     assert all(each.seq < 250 for each in events)
     assert len(events) + reader.dropped == 250

@@ -98,7 +98,7 @@ def clipped(force_n: float, limit_n: float) -> float:
     return max(-limit_n, min(limit_n, force_n))
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True, max_examples=150)
 @given(path=st.lists(SWITCHES, min_size=1, max_size=12))
 def test_whatever_is_switched_to_whatever_the_force_is_bounded_and_goes_by_ramps(
     path: list[tuple[str | None, str | None, str | None, int]],
@@ -137,7 +137,7 @@ def test_whatever_is_switched_to_whatever_the_force_is_bounded_and_goes_by_ramps
                     assert abs(contact.force_n - was[1]) <= step_bound_n(contact, *was[1:]) + 1e-9
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(derandomize=True, max_examples=60)
 @given(path=st.lists(SWITCHES, min_size=1, max_size=8))
 def test_a_debt_is_carried_through_every_switch(
     path: list[tuple[str | None, str | None, str | None, int]],

@@ -236,6 +236,16 @@ def test_a_helper_that_was_killed_is_replaced_when_it_is_needed_and_outlives_nob
         wait_until(lambda: gone(helper), "the helper to end")
 
 
+def test_that_nobody_stands_by_to_release_the_device_is_told_and_the_loop_goes_on() -> None:
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        assert subscriber.until("hapticd/status")["warnings"] == []
+        os.kill(helper_of(rig), signal.SIGKILL)
+        event = subscriber.until("hapticd/event", code=EventCode.NOBODY_STANDS_BY)
+        status = subscriber.until("hapticd/status")
+        assert status["warnings"][0] == event["text"]
+        assert (status["armed"], status["fault_code"]) == (True, 0)
+
+
 def helper_of(rig: Rig) -> int:
     """The process that stands by to release the device."""
     for entry in Path("/proc").glob("[0-9]*"):

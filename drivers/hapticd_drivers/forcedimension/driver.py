@@ -136,6 +136,9 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         if not sdk.drdIsInitialized(self._id):
             raise DeviceFaultError("omega7: the device is still not calibrated; switch it off and on and try again")
 
+    def _call_off(self) -> None:
+        self._opened().drdStop(False, self._id)  # ends the regulation that moves the arm, and its force
+
     def _enable(self) -> None:
         sdk = self._opened()
         device = self._id

@@ -83,9 +83,6 @@ OPTIONAL = frozenset(
 SATURATED = 2
 """Result of a force call: the motors cannot give that much, so it was scaled down in its direction. It is a success."""
 
-CACHED = 1
-"""Result of a getter: the last data is younger than the TimeGuard, so it was given again. It is a success."""
-
 STATUS_WORDS = 32
 """Room for `dhdGetStatus`: it writes 17 today and takes no length."""
 

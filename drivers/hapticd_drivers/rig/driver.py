@@ -76,7 +76,6 @@ class RigDriver(Driver[RigOptionsT]):
         self._homed = False
         self._sign_checked = options.sign_checked
         self._lock = threading.Lock()  # a calibration talks to the rig beside the loop
-        self._call_off = False
         self._knows_home = False
 
     @abstractmethod
@@ -112,7 +111,6 @@ class RigDriver(Driver[RigOptionsT]):
             self._answer_after_us = self.options.answer_after_us
         self._sample = Sample(identity.axes)
         self._button_bits = (1 << min(identity.buttons, 16)) - 1
-        self._call_off = False
         self._silent = 0
         self._until_counts = round(COUNTS_EVERY_S / self.period_s)
         state = talk.state()
@@ -228,7 +226,6 @@ class RigDriver(Driver[RigOptionsT]):
         talk.push(self._answer_after_us, [axis.force_un(n) for axis, n in zip(self._maps, force_n, strict=True)])
 
     def _disable(self) -> None:
-        self._call_off = True
         talk = self._talk
         if talk is None or not self._lock.acquire(timeout=1.0):
             return
@@ -285,10 +282,9 @@ class RigDriver(Driver[RigOptionsT]):
         return DeviceFaultError(f"{self.NAME}: the rig has switched its motor off: {why}")
 
     def _calibrate(self) -> None:
-        self._call_off = False
         with self._lock:
             talk = self._opened()
-            mover = RigMover(talk, self._maps, self._accept, self._stopped, lambda: self._call_off, self.period_s)
+            mover = RigMover(talk, self._maps, self._accept, self._stopped, lambda: self._called_off, self.period_s)
             try:
                 self._let_forces_through(urgent=False)
                 homes = [self._calibrated(mover, axis) for axis in range(len(self._maps))]

@@ -69,7 +69,7 @@ class RigMover:
         talk = self._talk
         for _ in range(MOST_MISSES):
             if self._called_off():
-                raise DriverStateError("the calibration was called off")
+                raise DriverStateError("called off")
             talk.push(0, force_un)
             self._due_s = max(self._due_s + self._period_s, time.monotonic())
             time.sleep(max(0.0, self._due_s - time.monotonic()))

@@ -6,6 +6,7 @@ import contextlib
 import os
 import signal
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -209,3 +210,26 @@ def test_calibration_moves_the_arm_once_it_is_disarmed_and_the_loop_goes_on(lab:
         assert (lab.look().get("moves"), lab.look().get("mode")) == (1, BRAKE)
         assert lab.ask("arm") == ""
         assert lab.look().get("mode") == FORCE
+
+
+@pytest.mark.parametrize("how", ["disarm", "terminate"])
+def test_a_calibration_that_moves_the_arm_ends_when_somebody_disarms_or_stops_the_daemon(lab: Lab, how: str) -> None:
+    assert lab.ask("disarm") == ""
+    wait_until(lambda: lab.look().get("mode") == BRAKE, "the ramp to end")
+    lab.look().set(hand_n=[0.0, 0.0, 0.0], calibrated=0, auto_init_us=600_000_000)
+    events = Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/timing")
+    with events as subscriber, ThreadPoolExecutor(1) as pool:
+        subscriber.until("hapticd/timing")
+        calibration = pool.submit(lab.ask, "calibrate")
+        wait_until(lambda: lab.look().get("moves") == 1, "the arm to move")
+        assert "hapticd disarm" in lab.ask("arm")
+        if how == "disarm":
+            assert lab.ask("disarm") == ""
+            assert "called off" in calibration.result(30.0)
+            assert "called off" in subscriber.until("hapticd/event", code=EventCode.CALIBRATION_ENDED)["text"]
+            assert lab.look().get("mode") == RESET
+            assert "not been calibrated" in lab.ask("arm")
+        lab.daemon.process.terminate()
+        assert lab.daemon.wait_exit() == 0
+        pool.shutdown(wait=False, cancel_futures=True)
+    assert lab.look().get("mode") == RESET

@@ -58,10 +58,14 @@ int drdAutoInit(char ID) {
     struct device *d = device_of(ID);
     if (!d)
         return -1;
-    struct timespec wait = {(time_t)(d->auto_init_us / 1e6), (long)((long long)(d->auto_init_us * 1e3) % 1000000000)};
-    nanosleep(&wait, 0);
     d->moves++;
     d->mode = FORCE;
+    d->regulating = 1;
+    for (double left_us = d->auto_init_us; left_us > 0; left_us -= 1000) {
+        nanosleep(&(struct timespec){0, left_us < 1000 ? (long)(left_us * 1e3) : 1000000}, 0);
+        if (!d->regulating) /* drdStop from another thread */
+            return fail(TIMEOUT);
+    }
     heard(d);
     if (d->auto_init_fails)
         return fail(TIMEOUT);

@@ -1,0 +1,72 @@
+"""An ordinary stop: a driver may take its time to let go of its device, but no force may stand meanwhile."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+
+from hapticd.config.loading import parse
+from hapticd.supervisor.service import Service
+from tests.daemon.running import Daemon
+from tests.daemon.test_deaths import PRESSED, nothing_left, pressing
+
+DRIVERS = '''
+"""A device that is let go of slowly, and one that hangs while its force is ramped out."""
+import time
+from pathlib import Path
+from hapticd_drivers.loopback import Loopback
+class Slow(Loopback):
+    """Ten times as long as a loop may stand still."""
+    def _close(self):
+        time.sleep(1.0)
+        super()._close()
+class Stuck(Loopback):
+    """Once the file is there."""
+    def _write(self, force_n):
+        if abs(force_n[0]) < 2.0 and Path(__file__).with_name("stuck").exists():
+            time.sleep(60.0)
+        super()._write(force_n)
+'''
+
+
+@pytest.fixture
+def laboratory(tmp_path: Path) -> Path:
+    (tmp_path / "slow_devices.py").write_text(DRIVERS)
+    package = tmp_path / "slow_devices-1.0.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: slow-devices\nVersion: 1.0\n")
+    points = "[hapticd.drivers]\nslow = slow_devices:Slow\nstuck = slow_devices:Stuck\n"
+    (package / "entry_points.txt").write_text(points)
+    return tmp_path
+
+
+def test_a_driver_that_is_slow_to_let_go_is_waited_for(laboratory: Path) -> None:
+    with Daemon(PRESSED + '[device]\ndriver = "slow"\n', pythonpath=laboratory).wait_ready() as daemon:
+        pressing(daemon)
+        daemon.process.send_signal(signal.SIGTERM)
+        assert daemon.wait_exit() == 0, daemon.output()
+        assert nothing_left(daemon)
+
+
+def test_a_loop_that_hangs_while_it_ramps_the_force_out_is_not_waited_for(laboratory: Path) -> None:
+    with Daemon(PRESSED + '[device]\ndriver = "stuck"\n', pythonpath=laboratory).wait_ready() as daemon:
+        pressing(daemon)
+        (laboratory / "stuck").touch()
+        daemon.process.send_signal(signal.SIGTERM)
+        assert daemon.wait_exit() == 1
+        assert "stood still for more than 0.1 s; the device is without force" in daemon.output()
+        assert nothing_left(daemon)
+
+
+def test_a_loop_that_has_to_be_killed_at_the_end_leaves_no_force_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Whatever the daemon ends for, such as an error of its own."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
+    service = Service(parse('[loop]\nrealtime = "off"\n', "lab.toml"), "default")
+    service.control.process.send_signal(signal.SIGSTOP)
+    service._undo.close()
+    assert service.control.exit_code == -signal.SIGKILL
+    assert "was killed; the device is without force" in caplog.text
