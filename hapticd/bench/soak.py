@@ -24,7 +24,7 @@ from typing import IO
 from hapticd.bench import Bar, Progress, Quantiles
 from hapticd.client import Client, Event, Timing, connect
 from hapticd.config.loading import load
-from hapticd.contracts.errors import HapticdError
+from hapticd.contracts.errors import ConfigError, HapticdError
 
 SILENCE_S = 30.0
 """How long nothing may come [s]."""
@@ -118,15 +118,19 @@ def measure(config: Path, duration_s: float, interval_s: float, progress: Progre
     """Run a daemon for a while.
 
     Args:
-        config: its configuration; telemetry has to publish every tick.
+        config: its configuration.
         duration_s: how long, from the first tick [s].
         interval_s: time between two looks [s].
         progress: told what is done.
 
     Raises:
+        ConfigError: not every tick would be published.
         HapticdError: it could not start, or ended before its time.
     """
-    loop = load(config).config.loop
+    loaded = load(config).config
+    loop, every_ticks = loaded.loop, loaded.telemetry.every_ticks
+    if every_ticks != 1:
+        raise ConfigError(f"{config}: telemetry.every_ticks = {every_ticks}: a soak counts every tick, so set it to 1")
     with tempfile.TemporaryDirectory(prefix="hapticd-soak-") as directory, (Path(directory) / "log").open("w+") as log:
         environment = os.environ | {"HAPTICD_RUNTIME_DIR": directory, "HAPTICD_STATE_DIR": directory}
         command = [sys.executable, "-m", "hapticd", "run", "--config", str(config)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +12,6 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -22,6 +20,7 @@ from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.examination import SCHEMA, Examination, verdict
 from hapticd.doctor.finding import Finding, Mark
 from hapticd.doctor.latency import Latency
+from hapticd.progress import progress_bar
 from hapticd.share import default_config
 from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, runtime_directory
 from hapticd.telemetry.status import LATE_EDGES_US
@@ -76,8 +75,8 @@ def _found(examination: Examination, seconds: float) -> Iterator[Finding]:
     """Every finding as soon as it is known; the measurement, when there is one, comes last."""
     yield from examination.findings()
     if seconds:
-        with _progress(seconds) as progress:
-            measured = examination.measured(seconds, progress)
+        with progress_bar(1.0, f"measuring {seconds:g} s") as tell:
+            measured = examination.measured(seconds, lambda share: tell(completed=share))
         yield from measured
 
 
@@ -157,15 +156,6 @@ def _filled(words: list[str], width: int, indent: str, joint: str) -> list[str]:
         else:
             lines.append(f"{indent}{word}" if lines else word)
     return [line + joint for line in lines[:-1]] + lines[-1:]
-
-
-@contextmanager
-def _progress(seconds: float) -> Iterator[Any]:
-    columns = (TextColumn(f"measuring {seconds:g} s"), BarColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
-        task = shown.add_task("", total=1.0)
-        yield lambda share: shown.update(task, completed=share)
 
 
 def _report(examination: Examination, findings: list[Finding]) -> dict[str, Any]:

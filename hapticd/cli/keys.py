@@ -12,7 +12,7 @@ import typer
 
 from hapticd.contracts.errors import ConfigError
 from hapticd.keys.directory import SECRET, KeyDirectory, key_directory
-from hapticd.keys.file import Key, is_key, new_pair, read, write
+from hapticd.keys.file import Key, is_key, new_pair, read, write, written
 
 app = typer.Typer(
     help="Say who may reach this computer's daemons from another one.",
@@ -126,7 +126,8 @@ def _make_daemons_own(force: bool) -> None:
 
 def _make_on_the_clients_computer(name: str, server_key: str, force: bool) -> None:
     pair = new_pair(_given(server_key).public)
-    file = _write_client(name, pair, force)
+    file = _file_of(name)
+    write(file, pair, replace=force)
     typer.echo(f"made {file}; now, on the daemon's computer:")
     typer.echo(f"  sudo hapticd keys add {shlex.quote(name)} {shlex.quote(pair.public)}")
 
@@ -140,12 +141,9 @@ def _make_for_a_client(name: str, watch_only: bool, force: bool) -> None:
             "on the client's own computer give its --server-key"
         )
     pair = new_pair(server.public)
-    file = _write_client(name, pair, force)
-    try:
+    file = _file_of(name)
+    with written(file, pair, replace=force):  # an older secret stays in its place until the new one is of use
         directory.add(name, Key(pair.public, watch_only=watch_only), force)
-    except BaseException:
-        file.unlink()  # nobody lists it
-        raise
     typer.echo(f"made {file} and listed {name}; bring that file to the client in a safe way, then remove it here")
     typer.echo(_reminder())
 
@@ -159,12 +157,10 @@ def _given(text: str) -> Key:
     return Key(text)
 
 
-def _write_client(name: str, pair: Key, force: bool) -> Path:
+def _file_of(name: str) -> Path:
     if Path(name).name != name:
         raise ConfigError(f"{name!r}: a name, not a path; the file goes into the present directory")
-    file = Path(f"{name}{SECRET}")
-    write(file, pair, replace=force)
-    return file
+    return Path(f"{name}{SECRET}")
 
 
 def _reminder() -> str:

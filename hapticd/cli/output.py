@@ -7,10 +7,10 @@ from contextlib import contextmanager
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from hapticd import bench
+from hapticd.progress import progress_bar
 
 _COLOURS = {"PASS": "green", "FAIL": "red", "INCONCLUSIVE": "yellow"}
 _MOST_RIVALS = 3  # named in a report
@@ -20,10 +20,8 @@ _WIDTH = 130  # of tables that go into a file
 @contextmanager
 def measuring(total_s: float) -> Iterator[bench.Progress]:
     """A progress bar; what is yielded advances it by so many seconds."""
-    columns = (TextColumn("measuring"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task("", total=total_s)
-        yield lambda seconds: shown.advance(task, seconds)
+    with progress_bar(total_s, "measuring") as tell:
+        yield lambda seconds: tell(advance=seconds)
 
 
 def make_console() -> Console:

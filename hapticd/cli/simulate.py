@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +13,7 @@ import typer
 
 from hapticd.config.loading import load
 from hapticd.contracts.errors import HapticdError
+from hapticd.progress import progress_bar
 from hapticd.study.offline import OfflineRun, Row, Summary
 from hapticd.study.traces import open_trace
 
@@ -47,8 +47,8 @@ def simulate(
         take: Callable[[Row], object] = _drop
         if output is not None:
             take = stack.enter_context(open_trace(output, run.ticks, overwrite)).append
-        with _progress(run.ticks) as progress:
-            summary = run.run(take, progress)
+        tell = stack.enter_context(progress_bar(run.ticks, "simulating"))
+        summary = run.run(take, lambda done: tell(completed=done))
     if as_json:
         given = {
             "config": str(config),
@@ -66,21 +66,6 @@ def simulate(
 
 def _drop(_row: Row) -> None:
     """Nobody wants the rows."""
-
-
-@contextlib.contextmanager
-def _progress(ticks: int) -> Iterator[Callable[[int], None] | None]:
-    """A bar on standard error where somebody looks at it."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("simulating"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task("", total=ticks)
-        yield lambda done: shown.update(task, completed=done)
 
 
 def _in_words(summary: Summary, period_s: float, output: Path | None) -> str:

@@ -17,7 +17,7 @@ MOST_ROWS = 15
 
 
 def soak(
-    duration: Annotated[float, typer.Option(min=1.0, help="How long [s].")] = 600.0,
+    duration: Annotated[float, typer.Option(min=1.0, max=1e7, help="How long [s].")] = 600.0,
     config: Annotated[
         Path | None, typer.Option("--config", "-c", help="Configuration; the default one when not given.")
     ] = None,

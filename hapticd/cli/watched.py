@@ -18,6 +18,7 @@ from hapticd.control.realtime import die_with_parent
 
 _POLL_S = 0.1
 _STOP_TIMEOUT_S = 10.0
+_VIEW_TIMEOUT_S = 3.0
 
 
 def run_watched(config: Path, instance: str) -> int:
@@ -48,16 +49,22 @@ def run_watched(config: Path, instance: str) -> int:
                 while view.poll() is None and daemon.poll() is None:
                     time.sleep(_POLL_S)
         finally:
+            # The daemon first: a view that a stopped terminal (Ctrl-S) holds up must not keep the force on.
+            daemon.send_signal(signal.SIGTERM)
             if view.poll() is None:
                 view.send_signal(signal.SIGINT)
             with contextlib.suppress(KeyboardInterrupt):
-                view.wait()
-            daemon.send_signal(signal.SIGTERM)
-            try:
-                code = daemon.wait(_STOP_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                daemon.kill()  # its control process releases the device by itself
-                code = daemon.wait()
+                _ended(view, _VIEW_TIMEOUT_S)
+            code = _ended(daemon, _STOP_TIMEOUT_S)  # killed, its control process releases the device by itself
             log.seek(0)
             typer.echo(log.read(), err=True, nl=False)
     return code
+
+
+def _ended(process: subprocess.Popen[bytes], timeout_s: float) -> int:
+    """Exit code of a process that was told to end; one that does not is killed."""
+    try:
+        return process.wait(timeout_s)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from hapticd.config.file import read
 from hapticd.config.loading import LoadedConfig, load
 from hapticd.config.models import Config, DeviceConfig, LoopConfig
 from hapticd.contracts.errors import ConfigError
@@ -65,8 +66,10 @@ def _salvaged(path: Path) -> tuple[LoopConfig, str, dict[str, str]]:
     loop, device = LoopConfig(), DeviceConfig()
     remote = Config()
     tables = {}
-    with contextlib.suppress(OSError, ValueError):
-        tables = {name: table for name, table in tomllib.loads(path.read_text()).items() if isinstance(table, dict)}
+    with contextlib.suppress(ConfigError, ValueError, RecursionError):
+        # A pipe has said all that it says when it was read the first time, and a second reader might wait for ever.
+        data = tomllib.loads(read(path, files_only=True).removeprefix("\ufeff"))
+        tables = {name: table for name, table in data.items() if isinstance(table, dict)}
     with contextlib.suppress(ValidationError):
         loop = LoopConfig.model_validate(tables.get("loop", {}))
     with contextlib.suppress(ValidationError):

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from hapticd import lookup
 from hapticd.doctor import configuration, driver, endpoints, kernel, memory, processor, rules, scheduling, usb
 from hapticd.doctor.attempt import attempt
 from hapticd.doctor.configuration import Wanted
@@ -46,6 +47,8 @@ class Examination:
         directory = runtime_directory(self.instance)
         tried = functools.cache(lambda: attempt(loop.priority))
         daemon = functools.cache(lambda: endpoints.running(directory, root))
+        # The daemon's device would only be shown as held, and looking for it might disturb the loop.
+        looked = functools.cache(lambda: lookup.look({name: options}, find=not _or_none(daemon))[0])
         faults = fault_directory(self.instance)
         return [
             Check("kernel.preemption", "kernel", lambda: kernel.preemption(root)),
@@ -60,11 +63,11 @@ class Examination:
             Check("scheduling.quota", "quota", lambda: scheduling.quota(root, _or_none(daemon))),
             Check("memory.locking", "memory", lambda: memory.locking(loop, tried().memory, root)),
             Check("memory.swap", "swap", lambda: memory.swap(tried().memory, root)),
-            Check("usb.devices", "devices", lambda: usb.devices(name, root)),
-            Check("usb.kernel_drivers", "bound driver", lambda: usb.kernel_drivers(name, root)),
-            Check("usb.controller", "controller", lambda: usb.controller(name, root)),
-            Check("usb.library", "libusb", lambda: usb.library(name, root)),
-            Check("driver.needs", "driver", lambda: driver.needs(name, options)),
+            Check("driver.needs", "driver", lambda: driver.needs(looked())),
+            Check("driver.devices", "devices", lambda: driver.devices(looked(), _or_none(daemon))),
+            Check(
+                "usb.controller", "controller", lambda: usb.controller([one.where for one in looked().devices], root)
+            ),
             Check("rules.installed", "udev rule", lambda: rules.installed(name, root)),
             Check("configuration.usable", "config", lambda: configuration.usable(self.wanted)),
             Check("endpoints.instance", "instance", lambda: endpoints.instance(self.instance, daemon())),

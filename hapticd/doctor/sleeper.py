@@ -29,7 +29,7 @@ def measured(loop: LoopConfig, seconds: float) -> dict[str, Any]:
     """Sleep to every deadline for so long.
 
     Returns:
-        `late_ns`, one a tick; `skipped` deadlines; `fifo`, whether scheduling and memory were as the loop wants them.
+        `late_ns`, one a tick; `skipped` deadlines; `realtime`, whether scheduling and memory were as the loop wants.
     """
     period_ns = loop.period_ns
     expected = max(1, round(seconds * 1e9 / period_ns))

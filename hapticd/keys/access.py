@@ -49,7 +49,8 @@ def key_ring(loaded: LoadedConfig) -> KeyRing | None:
     if not guarded:
         return None
     keys = KeyDirectory(key_directory())
-    if keys.pair() is None:
+    pair = keys.pair()
+    if pair is None:
         raise ConfigError(
             *(
                 f'{loaded.path}: {name} = "{endpoint}": takes keys, and there are none in {keys.path}: '
@@ -57,4 +58,4 @@ def key_ring(loaded: LoadedConfig) -> KeyRing | None:
                 for name, endpoint in guarded.items()
             )
         )
-    return keys.ring()
+    return KeyRing(pair, keys.clients())

@@ -106,17 +106,6 @@ class KeyDirectory:
             clients[path.stem] = key
         return clients
 
-    def ring(self) -> KeyRing:
-        """Everything.
-
-        Raises:
-            ConfigError: there is no pair, or a file cannot be used.
-        """
-        pair = self.pair()
-        if pair is None:
-            raise ConfigError(f"{self.path}: no keys there: make them with `hapticd keys make`")
-        return KeyRing(pair, self.clients())
-
     def make(self, force: bool = False) -> Key:
         """Make the daemon's own pair.
 

@@ -17,6 +17,7 @@ import re
 import stat
 import struct
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -107,22 +108,44 @@ def write(path: Path, key: Key, *, mode: int = 0o600, group: int = -1, replace: 
     Raises:
         KeyWriteError: it is there already, or cannot be written.
     """
-    try:
+    with written(path, key, mode=mode, group=group, replace=replace):
+        pass
+
+
+@contextlib.contextmanager
+def written(path: Path, key: Key, *, mode: int = 0o600, group: int = -1, replace: bool = False) -> Iterator[None]:
+    """The same around what has to succeed first: the file takes its place at the end, or leaves nothing behind.
+
+    Raises:
+        KeyWriteError: it is there already, or cannot be written.
+    """
+    with _told(path):
+        if not replace and os.path.lexists(path):
+            raise FileExistsError
         descriptor, unfinished = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with os.fdopen(descriptor, "w", encoding="ascii") as file:
-                file.write(_certificate(key))
-                os.fchown(descriptor, -1, group)
-                os.fchmod(descriptor, mode)
-                file.flush()
-                os.fsync(descriptor)
+    try:
+        with _told(path), os.fdopen(descriptor, "w", encoding="ascii") as file:
+            file.write(_certificate(key))
+            os.fchown(descriptor, -1, group)
+            os.fchmod(descriptor, mode)
+            file.flush()
+            os.fsync(descriptor)
+        yield
+        with _told(path):
             if replace:
                 Path(unfinished).rename(path)
             else:
                 path.hardlink_to(unfinished)  # unlike a rename, refuses to take the place of another
-        finally:
-            with contextlib.suppress(FileNotFoundError):
-                Path(unfinished).unlink()
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            Path(unfinished).unlink()
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Errors of the system, as errors of a key file."""
+    try:
+        yield
     except FileExistsError:
         raise KeyWriteError(f"{path}: is there already; --force puts a new one in its place") from None
     except OSError as error:

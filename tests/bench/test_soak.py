@@ -8,6 +8,8 @@ import pytest
 
 from hapticd.bench import Bar
 from hapticd.bench.soak import STOPPED_S, Soak, measure
+from hapticd.cli import main
+from hapticd.contracts.errors import ConfigError
 
 CONFIG = """
 [device.options]
@@ -68,3 +70,17 @@ def test_a_leak_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def test_ten_minutes_leave_nothing_behind(tmp_path: Path) -> None:
     found = soak(tmp_path, CONFIG, 600.0, 40.0)
     assert all(bar.verdict == "PASS" for bar in found.bars), found.bars
+
+
+def test_a_daemon_that_does_not_publish_every_tick_is_refused_before_it_starts(tmp_path: Path) -> None:
+    """Whoever counts ticks would take those for lost."""
+    with pytest.raises(ConfigError, match=r"lab\.toml: telemetry\.every_ticks = 10: .*set it to 1"):
+        soak(tmp_path, f"{CONFIG}\n[telemetry]\nevery_ticks = 10\n", 1.0, 1.0)
+
+
+@pytest.mark.parametrize("duration", ["inf", "nan", "1e300"])
+def test_a_duration_without_end_is_refused(duration: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["bench", "soak", "--duration", duration])
+    assert ended.value.code == 2
+    assert "'--duration': Input should be " in capsys.readouterr().err

@@ -90,9 +90,9 @@ def commands_of(app: typer.Typer, *path: str) -> list[tuple[str, ...]]:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    for path in commands_of(application(name)):
-        if path[0] != name:
-            continue
+    paths = [path for path in commands_of(application(name)) if path[0] == name]
+    assert paths
+    for path in paths:
         with pytest.raises(SystemExit) as ended:
             main([*path, "--help"])
         shown = capsys.readouterr().out

@@ -130,6 +130,22 @@ def test_what_is_there_already_stays_and_a_refusal_leaves_no_client_behind(keys:
     assert "every listed client needs that key" in said("keys", "make", "--force")
 
 
+def test_a_new_key_that_cannot_be_listed_leaves_the_old_one_in_its_place(keys: KeyDirectory) -> None:
+    said("keys", "make")
+    said("keys", "make", "laptop")
+    secret, listed = Path("laptop.key_secret").read_text(), keys.clients()
+    broken = keys.path / "clients" / "broken.key"
+    broken.write_text("nonsense")
+    assert "broken.key: no public-key in it" in refused("keys", "make", "laptop", "--force")
+    broken.unlink()
+    Path("a b.key_secret").write_text("of somebody's own")
+    assert "a client's name has letters" in refused("keys", "make", "a b", "--force")
+    assert Path("laptop.key_secret").read_text() == secret
+    assert Path("a b.key_secret").read_text() == "of somebody's own"
+    assert keys.clients() == listed
+    assert not list(Path().glob(".*"))
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [

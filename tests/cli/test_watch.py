@@ -323,7 +323,7 @@ def test_json_is_a_line_a_status(feed: Feed) -> None:
 NUMBERS = st.floats(-1e300, 1e300) | st.floats(-1.0, 1.0)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(
     width=st.integers(1, 200),
     height=st.integers(1, 60),
@@ -413,7 +413,6 @@ def test_a_plot_puts_values_where_its_axis_says() -> None:
     assert lines[-1].index("⣀" if "⣀" in lines[-1] else lines[-1][7]) == 7
 
 
-@settings(deadline=None)
 @given(st.floats(-1e6, 1e6), st.floats(0.0, 1e6), st.floats(1e-3, 10.0))
 def test_an_axis_holds_its_values_and_is_round(lowest: float, length: float, least: float) -> None:
     bottom, top = axis(lowest, lowest + length, least)

@@ -12,6 +12,8 @@ from tests.daemon.terminal import Terminal
 
 CONFIG = Path(__file__).parents[2] / "config" / "hapticd.toml"
 
+CTRL_S, CTRL_Q = b"\x13", b"\x11"
+
 
 def test_from_one_command_to_a_live_view_and_back(tmp_path: Path) -> None:
     text = CONFIG.read_text().replace('tcp = "tcp://127.0.0.1:9872"', "")
@@ -54,5 +56,23 @@ def test_a_daemon_does_not_outlive_whoever_started_it_with_a_view(tmp_path: Path
         terminal.process.send_signal(end)
         terminal.process.wait(PATIENCE_S)
         wait_until(lambda: not list((tmp_path / "default").iterdir()), "the daemon to end")
+    finally:
+        terminal.close()
+
+
+def test_a_view_that_a_stopped_terminal_holds_up_keeps_no_daemon(tmp_path: Path) -> None:
+    """Nor its force: the view cannot even say that it ends."""
+    config = tmp_path / "lab.toml"
+    config.write_text("")
+    command = (HAPTICD, "run", "--config", str(config), "--watch")
+    terminal = Terminal(*command, environment={"HAPTICD_RUNTIME_DIR": str(tmp_path)})
+    try:
+        terminal.until("ARMED")
+        terminal.type(CTRL_S)
+        terminal.process.send_signal(signal.SIGINT)
+        wait_until(lambda: not list((tmp_path / "default").iterdir()), "the daemon to end")
+        terminal.type(CTRL_Q)
+        terminal.until("stopped")
+        assert terminal.process.wait(PATIENCE_S) == 0
     finally:
         terminal.close()

@@ -1,4 +1,4 @@
-"""What the doctor says of devices, their nodes, drivers, neighbours, libraries and rules."""
+"""What the doctor says of devices, their drivers, neighbours on USB and rules."""
 
 from __future__ import annotations
 
@@ -6,168 +6,139 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.doctor import driver, rules, usb
+from hapticd import lookup, registry
+from hapticd.config.models import LoopConfig
+from hapticd.contracts.driver import Driver, DriverOptions, FoundDevice
+from hapticd.doctor import driver, endpoints, rules, usb
+from hapticd.doctor.configuration import Wanted
+from hapticd.doctor.examination import Examination
+from hapticd.doctor.finding import examine
+from hapticd.lookup import Lookup, look
 from hapticd.share import directory
+from hapticd_drivers.rig.serial_rig import SerialRigOptions
 from tests.doctor.machine import Machine, says
 from tests.drivers.plugin import install
 
-
-@pytest.fixture
-def stranger(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A user who may open nothing."""
-    monkeypatch.setattr("os.access", lambda *_: False)
-
-
 # -- on the bus
-
-
-def test_a_computer_without_usb_is_well_while_nothing_needs_it(machine: Machine) -> None:
-    says(usb.devices("loopback", machine.root), "ok", "no USB")
-    says(usb.devices("omega7", machine.root), "problem", "none is on the bus")
-
-
-@pytest.mark.parametrize("product", ["0402", "0301"])
-def test_force_dimension_is_told_by_its_vendor_alone(machine: Machine, product: str) -> None:
-    machine.usb("1-2", "1451", product, name="omega.x haptic device")
-    says(usb.devices("omega7", machine.root), "ok", "omega.x haptic device", "port 1-2", "/dev/bus/usb/001/002")
-
-
-@pytest.mark.usefixtures("stranger")
-def test_a_device_that_this_user_may_not_open_is_a_matter_of_rules(machine: Machine) -> None:
-    machine.usb("1-2", "1451", "0402")
-    found = says(usb.devices("omega7", machine.root), "problem", "may not open /dev/bus/usb/001/002")
-    assert "service install" in found.mend[0]
-    assert "replug" in found.mend[1]
-
-
-def test_a_device_without_a_node_is_in_a_container(machine: Machine) -> None:
-    machine.usb("1-2", "1451", "0402", node=False)
-    assert "container" in says(usb.devices("omega7", machine.root), "problem", "without a node").mend[0]
-
-
-@pytest.mark.usefixtures("stranger")
-def test_a_device_that_is_not_configured_is_named_and_no_problem(machine: Machine) -> None:
-    machine.usb("1-2", "0403", "cb48", name="Falcon")
-    machine.usb("1-3", "0403", "6001", name="some other FTDI chip")
-    machine.usb("1-4", "2988", "0302")
-    falcon, touch = usb.devices("loopback", machine.root)
-    says(falcon, "ok", "Falcon", "not the configured one", "falcon")
-    says(touch, "ok", "3D Systems Touch", "no driver")
-
-
-def rig(machine: Machine, *, node: bool = True, bound: str = "usbhid") -> None:
-    path = machine.usb("1-5", "16c0", "0486", name="Teensy", bound=bound)
-    hidraw = path.relative_to(machine.root) / "1-5:1.0/0003:16C0:0486.0001/hidraw/hidraw3"
-    machine.file(f"{hidraw}/dev", "240:3")
-    if node:
-        machine.file("dev/hidraw3")
-
-
-def test_a_rig_is_reached_through_its_hidraw_node(machine: Machine) -> None:
-    rig(machine)
-    says(usb.devices("hid-rig", machine.root), "ok", "Teensy", "/dev/hidraw3")
-
-
-def test_a_rig_without_usbhid_is_bound_by_hand(machine: Machine) -> None:
-    rig(machine, node=False, bound="")
-    for found in (usb.devices("hid-rig", machine.root), usb.kernel_drivers("hid-rig", machine.root)):
-        assert "echo 1-5:1.0" in says(found, "problem").mend[0]
-
-
-@pytest.mark.parametrize(
-    ("bound", "mark", "word"), [("", "ok", "none"), ("ftdi_sio", "ok", "detaches"), ("usbfs", "advice", "open already")]
-)
-def test_whoever_holds_the_device_is_named(machine: Machine, bound: str, mark: str, word: str) -> None:
-    machine.usb("1-2", "0403", "cb48", bound=bound)
-    found = says(usb.kernel_drivers("falcon", machine.root), mark, word)
-    if mark == "advice":
-        assert found.mend == ("sudo fuser -v /dev/bus/usb/001/002",)
 
 
 def test_a_camera_on_the_same_controller_disturbs(machine: Machine) -> None:
     machine.usb("1-2", "1451", "0402")
     machine.usb("1-3", "046d", "0825", name="Webcam", interface_class="0e")
     machine.usb("1-4", "046d", "c077", name="Mouse", interface_class="03")
-    found = says(usb.controller("omega7", machine.root), "advice", "0000:00:14.0", "Webcam (video)")
+    found = says(usb.controller(["001:002"], machine.root), "advice", "0000:00:14.0", "Webcam (video)")
     assert "Mouse" not in found.text
 
 
 def test_a_camera_on_another_controller_does_not(machine: Machine) -> None:
     machine.usb("1-2", "1451", "0402")
     machine.usb("3-1", "046d", "0825", controller="0000:03:00.0", interface_class="0e")
-    says(usb.controller("omega7", machine.root), "ok", "nothing greedy on 0000:00:14.0")
+    says(usb.controller(["001:002"], machine.root), "ok", "port 1-2: nothing greedy on 0000:00:14.0")
 
 
 def test_two_buses_of_one_controller_are_one_controller(machine: Machine) -> None:
     """A USB 3 controller shows a bus for each speed."""
     machine.usb("1-2", "1451", "0402")
     machine.usb("2-1", "0bda", "0316", name="Disk", interface_class="08")
-    says(usb.controller("omega7", machine.root), "advice", "Disk (a disk)")
+    says(usb.controller(["001:002"], machine.root), "advice", "Disk (a disk)")
 
 
-@pytest.mark.parametrize("look", [usb.kernel_drivers, usb.controller])
-def test_of_a_device_that_is_not_there_nothing_is_said(machine: Machine, look: object) -> None:
-    assert callable(look)
-    says(look("omega7", machine.root), "ok", "not there")
-    says(look("loopback", machine.root), "ok", "not needed")
+@pytest.mark.parametrize(
+    ("kind", "node"), [("hidraw", "hidraw3"), ("tty", "ttyACM0"), ("tty", "ttyUSB0"), ("libusb", "")]
+)
+def test_a_device_is_found_where_its_driver_says_whatever_its_numbers(machine: Machine, kind: str, node: str) -> None:
+    path = machine.usb("1-5", "1234", "5678", name="a rig of one's own")
+    machine.usb("1-3", "046d", "0825", name="Webcam", interface_class="0e")
+    place = "1-5:1.0"
+    if node:
+        below = path.relative_to(machine.root) / "1-5:1.0" / kind / node
+        machine.file(f"{below}/dev", "240:3")
+        machine.link(f"{below}/device", path / "1-5:1.0")
+        machine.link(f"sys/class/{kind}/{node}", machine.root / below)
+        machine.link(f"dev/serial/by-id/usb-{node}", machine.file(f"dev/{node}"))
+        place = f"/dev/serial/by-id/usb-{node}" if kind == "tty" else f"/dev/{node}"
+    says(usb.controller([place], machine.root), "advice", "port 1-5", "Webcam")
 
 
-# -- serial ports
-
-
-def port(machine: Machine, name: str, latency_ms: str = "") -> None:
-    machine.file(f"sys/class/tty/{name}/dev", "188:0")
-    machine.file("sys/class/tty/ttyS0/dev", "4:64")
-    machine.file(f"dev/{name}")
-    if latency_ms:
-        machine.file(f"sys/bus/usb-serial/devices/{name}/latency_timer", latency_ms)
-
-
-def test_a_serial_rig_needs_a_port_on_usb(machine: Machine) -> None:
-    machine.file("sys/class/tty/ttyS0/dev", "4:64")
-    says(usb.devices("serial-rig", machine.root), "problem", "no serial port")
-
-
-@pytest.mark.parametrize(("latency_ms", "mark"), [("", "ok"), ("1", "ok"), ("16", "advice")])
-def test_an_adapter_that_keeps_bytes_back_is_told_not_to(machine: Machine, latency_ms: str, mark: str) -> None:
-    port(machine, "ttyUSB0", latency_ms)
-    says(usb.devices("serial-rig", machine.root), mark, "/dev/ttyUSB0")
-
-
-@pytest.mark.usefixtures("stranger")
-def test_a_port_belongs_to_dialout(machine: Machine) -> None:
-    port(machine, "ttyACM1")
-    assert "dialout" in says(usb.devices("serial-rig", machine.root), "problem", "/dev/ttyACM1").mend[0]
-
-
-# -- libraries
-
-
-def test_libusb_is_looked_for_by_those_who_load_it(machine: Machine) -> None:
-    says(usb.library("loopback", machine.root), "ok", "not needed")
-    assert "apt install libusb" in says(usb.library("omega7", machine.root), "problem").mend[0]
-    machine.file("usr/lib/x86_64-linux-gnu/libusb-1.0.so.0")
-    says(usb.library("omega7", machine.root), "ok", "/usr/lib/x86_64-linux-gnu")
+@pytest.mark.parametrize("place", ["", "/dev/ttyS0", "001:009", "9-9:1.0"])
+def test_of_a_device_that_is_not_on_usb_nothing_is_said(machine: Machine, place: str) -> None:
+    machine.usb("1-2", "1451", "0402")
+    machine.file("sys/class/tty/ttyS0/device/id", "PNP0501")
+    machine.file("dev/ttyS0")
+    says(usb.controller([place], machine.root), "ok", "no device on USB")
 
 
 # -- what the driver says itself
 
 
+def looked(driver: str, options: DriverOptions | None = None) -> Lookup:
+    (answer,) = look({driver: options})
+    return answer
+
+
 def test_a_driver_that_needs_nothing_is_well() -> None:
-    says(driver.needs("loopback", None), "ok", "loopback needs nothing")
+    answer = looked("loopback")
+    says(driver.needs(answer), "ok", "loopback needs nothing")
+    says(driver.devices(answer, 0), "ok", "omega7 model, simulated")
 
 
 def test_what_the_driver_says_is_what_the_doctor_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install(tmp_path, monkeypatch, "diagnose(cls, options=None): return [Diagnosis('problem', 'no lib', ('get',))]")
-    says(driver.needs("odd", None), "problem", "no lib")
+    says(driver.needs(looked("odd")), "problem", "no lib")
 
 
 @pytest.mark.parametrize("body", ["raise ValueError('odd')", "os.abort()", "return 1"])
 def test_a_driver_that_cannot_say_is_no_finding_about_the_computer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str
 ) -> None:
-    install(tmp_path, monkeypatch, f"diagnose(cls, options=None): {body}")
-    says(driver.needs("odd", None), "unknown", "odd: ")
+    install(tmp_path, monkeypatch, f"diagnose(cls, options=None): {body}", f"find(cls, options=None): {body}")
+    answer = looked("odd")
+    says(driver.needs(answer), "unknown", "odd: ")
+    says(driver.devices(answer, 0), "unknown", "odd did not look")
+
+
+def test_a_rig_is_looked_for_where_its_options_say(tmp_path: Path) -> None:
+    """A port that is not on USB is as good as any, when the configuration names it."""
+    node = tmp_path / "ttyS0"
+    node.touch()
+    says(driver.devices(looked("serial-rig", SerialRigOptions(port=str(node))), 0), "ok", f"({node})", "whether it is")
+    node.unlink()
+    found = says(driver.devices(looked("serial-rig", SerialRigOptions(port=str(node))), 0), "problem", "no device")
+    assert found.mend[0].startswith("# plug the rig in")
+
+
+def test_a_device_that_cannot_be_used_is_a_problem_unless_there_is_another() -> None:
+    locked = FoundDevice("rig", "7", "/dev/hidraw0", "this user may not open it", mend=("sudo chmod",))
+    busy = FoundDevice("rig", "8", problem="another program has it open")
+    free = FoundDevice("rig", "9", note="not calibrated")
+    alone = says(driver.devices(Lookup("hid-rig", (locked,)), 0), "problem", "rig 7 (/dev/hidraw0): this user may not")
+    assert alone.mend == ("sudo chmod",)
+    first, second, third = driver.devices(Lookup("hid-rig", (locked, busy, free)), 0)
+    says(first, "advice", "rig 7")
+    assert "devices hid-rig" in says(second, "advice", "rig 8: another program").mend[0]
+    says(third, "ok", "rig 9: not calibrated")
+
+
+def test_a_driver_that_cannot_look_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Looking is optional; that it found nothing would then be a claim about nothing."""
+    monkeypatch.setattr(registry, "driver", lambda _: Driver)
+    says(driver.devices(Lookup("odd"), 0), "unknown", "odd cannot look")
+
+
+def test_beside_the_daemon_nothing_is_looked_for(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def note(drivers: dict[str, DriverOptions | None], *, find: bool) -> list[Lookup]:
+        asked.append(find)
+        return [Lookup(name) for name in drivers]
+
+    monkeypatch.setattr(endpoints, "running", lambda *_: 4711)
+    monkeypatch.setattr(lookup, "look", note)
+    wanted = Wanted(Path("lab.toml"), LoopConfig(), "hid-rig", {})
+    checks = {check.name: check for check in Examination(wanted, "default", machine.root).checks()}
+    says(examine(checks["driver.devices"]), "ok", "running daemon")
+    says(examine(checks["usb.controller"]), "ok")
+    assert asked == [False]
 
 
 # -- rules

@@ -6,6 +6,7 @@ import fcntl
 import os
 import shutil
 import socket
+import threading
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -168,6 +169,34 @@ def test_a_file_of_nonsense_leaves_the_defaults(tmp_path: Path, text: str) -> No
     wanted = Wanted.of(path)
     assert (wanted.driver, wanted.loop.rate_hz) == ("loopback", 1000.0)
     assert {found.mark for found in configuration.usable(wanted)} == {"problem"}
+
+
+def test_a_mark_at_the_start_of_a_file_that_cannot_be_used_hides_nothing_of_it(tmp_path: Path) -> None:
+    """Windows editors put it there."""
+    path = tmp_path / "lab.toml"
+    path.write_text("[device]\ndriver = 'omega7'\nspeed = 3\n", encoding="utf-8-sig")
+    assert Wanted.of(path).driver == "omega7"
+
+
+@pytest.mark.parametrize("text", ["x = " + "[" * 5000, "# " + "x" * (1 << 20)])
+def test_a_file_that_nobody_can_read_to_its_end_says_so_and_nothing_else(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_text(f"[device]\ndriver = 'omega7'\n{text}\n")
+    wanted = Wanted.of(path)
+    assert wanted.driver == "loopback"
+    says(configuration.usable(wanted), "problem", f"{path}: ")
+
+
+def test_what_is_no_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pipe would keep its second reader waiting, and a device such as /dev/zero has no end."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    writer = threading.Thread(target=path.write_text, args=("[loop]\nrate_hz = 50\n",))
+    writer.start()
+    says(configuration.usable(Wanted.of(path)), "problem", "loop.rate_hz = 50")
+    writer.join()
+    monkeypatch.setattr("pathlib.Path.read_text", lambda _: pytest.fail("an endless read"))
+    assert Wanted.of(Path("/dev/zero")).driver == "loopback"
 
 
 def test_a_missing_file_is_copied_from_the_shipped_one(tmp_path: Path) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from hapticd.bench import Quantiles
 from hapticd.config.models import LoopConfig
 from hapticd.contracts.errors import HapticdError
-from hapticd.doctor import latency
 from hapticd.doctor.latency import Latency, judge, measure
 from tests.doctor.machine import says
 
@@ -86,6 +87,6 @@ def test_every_deadline_was_met_or_skipped(rate_hz: float) -> None:
 
 
 def test_a_child_that_fails_is_reported_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(latency.sys, "executable", "/bin/false")  # type: ignore[attr-defined]
+    monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(HapticdError, match="child that measures failed: 1"):
         measure(LoopConfig(), 0.1)

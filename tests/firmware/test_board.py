@@ -207,7 +207,7 @@ def test_an_unplugged_rig_is_without_force_and_comes_back_as_just_switched_on(bo
         assert refused.reason == messages.NO_HELLO
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(garbage=st.binary(max_size=300))
 def test_after_any_garbage_the_second_frame_is_understood(board: Board, garbage: bytes) -> None:
     board.unplug()

@@ -9,6 +9,11 @@ import pytest
 from hapticd_drivers.rig import messages
 from tests.firmware.tools import FIRMWARE, HERE, need, run
 
+POWER_ON, BY_WATCHDOG = 1 << 0, 1 << 4
+"""Bits of the reset cause register."""
+RESTART = 3
+"""Fault of the protocol."""
+
 
 @pytest.fixture(scope="session")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -27,10 +32,11 @@ def report(message: bytes) -> str:
     return f"report {(bytes([len(message)]) + message).ljust(64, bytes(1)).hex()}"
 
 
-def live(program: Path, *lines: str) -> list[messages.Message | str]:
-    """What the rig does about it: messages decoded, motor lines as they are."""
+def live(program: Path, *lines: str, reset_cause: int = POWER_ON) -> list[messages.Message | str]:
+    """What the rig does about it: messages decoded, other lines as they are."""
     done: list[messages.Message | str] = []
-    for line in run(program, given="\n".join(lines) + "\n").splitlines():
+    command = ("env", f"RESET_CAUSE={reset_cause}", program)
+    for line in run(*command, given="\n".join(lines) + "\n").splitlines():
         if line.startswith("report "):
             raw = bytes.fromhex(line.split()[1])
             assert len(raw) == 64
@@ -80,3 +86,38 @@ def test_buttons_and_home_switch_are_active_low(program: Path) -> None:
     *_, state = live(program, report(messages.hello(1)), "edge 6 0", "edge 7 0", report(messages.poll(2, 0)))
     assert isinstance(state, messages.State)
     assert (state.flags, state.buttons) == (messages.HOME_SWITCH_CLOSED, 1)
+
+
+@pytest.mark.parametrize("line", ["time 1", "edge 2 1", "slip", "edge 7 0", report(messages.hello(1))])
+def test_the_watchdog_is_fed_once_a_round_and_by_no_interrupt(program: Path, line: str) -> None:
+    """What resets a program that hangs: 0.5 s, enabled, and neither of the requests that are made by writing 0."""
+    wdog = f"watchdog {0x04 | 0x10 | 0x20:04x} 5555 aaaa"
+    said = live(program, "watchdog", line, "watchdog")
+    assert (said[0], said[-1]) == (wdog, wdog)
+
+
+def test_a_restart_by_the_watchdog_is_a_fault_until_somebody_disables(program: Path) -> None:
+    start = [report(messages.hello(1)), report(messages.enable(2)), report(messages.force(3, 0, [2_500_000])), "motor"]
+    again = [
+        report(messages.disable(4)),
+        report(messages.enable(5)),
+        report(messages.force(6, 0, [2_500_000])),
+        "motor",
+    ]
+    told, _, refused, _, still, *_, enabled, _, moving, causes = live(
+        program, *start, *again, "causes", reset_cause=BY_WATCHDOG
+    )
+    assert isinstance(told, messages.Fault)
+    assert (told.fault, told.axis, told.detail) == (RESTART, messages.NO_AXIS, BY_WATCHDOG)
+    assert isinstance(refused, messages.State)
+    assert (refused.flags & messages.ENABLED, refused.fault) == (0, RESTART)
+    assert isinstance(enabled, messages.State)
+    assert (enabled.flags & messages.ENABLED, enabled.fault) == (messages.ENABLED, 0)
+    assert (still, moving) == ("motor 1 0", "motor 1 1024")
+    assert causes == f"causes {BY_WATCHDOG:x}", "what is not cleared is told again after the next start"
+
+
+def test_being_switched_on_is_no_fault(program: Path) -> None:
+    _, state = live(program, report(messages.hello(1)), report(messages.enable(2)))
+    assert isinstance(state, messages.State)
+    assert (state.flags & messages.ENABLED, state.fault) == (messages.ENABLED, 0)

@@ -69,14 +69,11 @@ def test_the_services_group_is_for_root_to_give(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_ring_says_who_may_watch_and_who_may_command(keys: KeyDirectory) -> None:
-    with pytest.raises(ConfigError, match=f"{keys.path}: no keys there: make them with `hapticd keys make`"):
-        keys.ring()
-    pair = keys.make()
     laptop, wall = new_pair(), new_pair()
     keys.add("laptop", laptop)
     keys.add("wall", replace(wall, watch_only=True))
-    ring = keys.ring()
-    assert ring == KeyRing(pair, {"laptop": Key(laptop.public), "wall": Key(wall.public, watch_only=True)})
+    assert keys.clients() == {"laptop": Key(laptop.public), "wall": Key(wall.public, watch_only=True)}
+    ring = KeyRing(new_pair(), keys.clients())
     assert ring.watchers() == {laptop.public, wall.public}
     assert ring.commanders() == {laptop.public}
     assert laptop.secret not in (keys.path / "clients" / "laptop.key").read_text()
@@ -89,7 +86,7 @@ def test_nothing_is_replaced_unless_that_is_asked_for(keys: KeyDirectory) -> Non
         keys.make()
     with pytest.raises(KeyWriteError, match="is there already"):
         keys.add("laptop", new_pair())
-    assert keys.ring() == KeyRing(pair, {"laptop": Key(laptop.public)})
+    assert (keys.pair(), keys.clients()) == (pair, {"laptop": Key(laptop.public)})
     assert keys.make(force=True) != pair
     keys.add("laptop", Key(laptop.public, watch_only=True), force=True)
     assert keys.clients() == {"laptop": Key(laptop.public, watch_only=True)}
@@ -130,7 +127,7 @@ def test_a_file_that_is_no_key_is_named_and_lets_nobody_in(keys: KeyDirectory) -
     broken = keys.path / "clients" / "broken.key"
     broken.write_text("nonsense")
     with pytest.raises(ConfigError, match=f"{broken}: no public-key in it"):
-        keys.ring()
+        keys.clients()
     (keys.path / "server.key_secret").write_text((keys.path / "server.key_secret").read_text().split("    secret")[0])
     with pytest.raises(ConfigError, match=r"server\.key_secret: no secret-key in it"):
         keys.pair()

@@ -78,9 +78,9 @@ def test_a_file_is_never_replaced_unless_that_is_asked_for(tmp_path: Path) -> No
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("replace", [True, False])
+@pytest.mark.parametrize(("name", "replace"), [("a.key_secret", True), ("b.key_secret", False)])
 def test_a_disk_that_is_full_leaves_what_was_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, replace: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, replace: bool
 ) -> None:
     path = tmp_path / "a.key_secret"
     pair = new_pair()
@@ -91,7 +91,7 @@ def test_a_disk_that_is_full_leaves_what_was_there(
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(KeyWriteError, match="No space left on device"):
-        write(path, new_pair(), replace=replace)
+        write(tmp_path / name, new_pair(), replace=replace)
     assert list(tmp_path.iterdir()) == [path]
     assert read(path) == pair
 

@@ -1,5 +1,6 @@
 /* One-axis rig on a Teensy: the protocol core, and this board behind it. Messages come and go in raw HID reports. */
 #include <core_pins.h>
+#include <imxrt.h>
 #include <usb_rawhid.h>
 
 #include "board.h"
@@ -18,6 +19,9 @@ static const struct rig_description DESCRIPTION = {
     .serial = SERIAL,
     .axis = {{COUNT_PM, MAX_FORCE_UN, LOWEST_COUNTS, HIGHEST_COUNTS}},
 };
+
+/* Why the processor started; 0 once that has been dealt with. */
+static uint32_t reset_cause;
 
 static struct {
     volatile int32_t counts;
@@ -79,14 +83,22 @@ static void drive(void *board, uint8_t axis, int32_t force_un)
 static bool problem(void *board, struct rig_problem *problem)
 {
     (void)board;
-    *problem = (struct rig_problem){RIG_SENSOR_FAULT, 0, encoder.counts};
-    return encoder.slipped;
+    if (encoder.slipped) {
+        *problem = (struct rig_problem){RIG_SENSOR_FAULT, 0, encoder.counts};
+        return true;
+    }
+    if (reset_cause & SRC_SRSR_WDOG_RST_B) {
+        *problem = (struct rig_problem){RIG_RESTART_FAULT, RIG_NO_AXIS, (int32_t)reset_cause};
+        return true;
+    }
+    return false;
 }
 
 static void forget_problem(void *board)
 {
     (void)board;
     encoder.slipped = false;
+    reset_cause = 0;
 }
 
 static void send(void *board, const uint8_t *message, uint8_t length)
@@ -115,14 +127,34 @@ static void start_pins(void)
     attachInterrupt(PIN_ENCODER_B, edge, CHANGE);
 }
 
+static void feed_watchdog(void)
+{
+    WDOG1_WSR = 0x5555;
+    WDOG1_WSR = 0xAAAA;
+}
+
+/* From here on a program that hangs, or whose fault the library keeps in a loop, is reset after 0.5 s, which is the
+ * shortest time of WDOG1. Reset lets go of the motor. */
+static void start_watchdog(void)
+{
+    reset_cause = SRC_SRSR;
+    SRC_SRSR = reset_cause; /* its bits are cleared by writing ones */
+    CCM_CCGR3 |= CCM_CCGR3_WDOG1(CCM_CCGR_ON);
+    WDOG1_WMCR = 0; /* no power-down counter */
+    /* One write, since most bits can be written once. SRS and WDA are requests while they are 0. */
+    WDOG1_WCR = WDOG_WCR_WT(0) | WDOG_WCR_SRS | WDOG_WCR_WDA | WDOG_WCR_WDE;
+}
+
 int main(void)
 {
     static struct rig rig;
     static uint8_t report[REPORT_SIZE];
 
     start_pins();
+    start_watchdog();
     rig_start(&rig, &DESCRIPTION, &HAL, 0);
     for (;;) {
+        feed_watchdog(); /* here only: what hangs in the loop while interrupts go on has to be reset too */
         rig_work(&rig);
         if (usb_rawhid_available() <= 0 || usb_rawhid_recv(report, 0) <= 0) {
             continue;

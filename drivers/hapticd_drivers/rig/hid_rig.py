@@ -16,7 +16,7 @@ class HidRig(RigDriver[HidRigOptions]):
 
     Options = HidRigOptions
     NAME = "hid-rig"
-    ABSENT = "plug the rig in; lsusb shows 16c0:0486"
+    ABSENT = "plug the rig in; lsusb shows 16c0:0486, or the numbers of device.options"
 
     @classmethod
     def find(cls, options: HidRigOptions | None = None) -> list[FoundDevice]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 from hapticd.contracts.errors import DeviceDisconnectedError
@@ -24,7 +25,8 @@ class HidLink:
     """A HID device as a link: reading never waits, and writing is the outbox's.
 
     Two threads use one hidapi handle, this one to read and the outbox's to write, and each leaves it alone after its
-    first error: more hidapi does not allow.
+    first error: more hidapi does not allow. Closing frees the handle, so it waits for the end of a read: a pulled plug
+    fails a write while this thread still reads.
 
     Args:
         hid: the device; closed with the link.
@@ -43,9 +45,11 @@ class HidLink:
             self.notes = (
                 "hid-rig: through libusb, which is slower than hidraw and takes the rig from the kernel's driver",
             )
+        self._hid = hid
         self._read = hid.device.read
+        self._reading = threading.Lock()
         self._lost = False
-        self._outbox = Outbox(hid.device.write, hid.close)
+        self._outbox = Outbox(hid.device.write, self._release)
         self._waited_for: list[list[int]] = []
 
     @property
@@ -109,14 +113,21 @@ class HidLink:
         self._outbox.end()
 
     def _next_report(self, timeout_ms: int) -> list[int]:
-        if self._lost:
-            raise self._gone()
-        try:
-            report: list[int] = self._read(REPORT_SIZE, timeout_ms)
-        except (OSError, ValueError) as error:  # hidapi gives no reason
+        with self._reading:
+            if self._lost:
+                raise self._gone()
+            try:
+                report: list[int] = self._read(REPORT_SIZE, timeout_ms)
+            except (OSError, ValueError) as error:  # hidapi gives no reason
+                self._lost = True
+                raise self._gone() from error
+            return report
+
+    def _release(self) -> None:
+        """Give the device back, on the outbox's thread: a calibration may still read when its driver is closed."""
+        with self._reading:
             self._lost = True
-            raise self._gone() from error
-        return report
+            self._hid.close()
 
     def _gone(self) -> DeviceDisconnectedError:
         return DeviceDisconnectedError(f"hid-rig: {self.where} is gone: the rig was unplugged or lost its power")

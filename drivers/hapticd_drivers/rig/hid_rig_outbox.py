@@ -26,7 +26,7 @@ class Outbox(threading.Thread):
 
     Args:
         write: writes one report; negative when it failed.
-        release: called by this thread after the last one.
+        release: called by this thread once the end was asked for, and never before: others may be using what it frees.
 
     Attributes:
         failed: a write has failed; nothing goes out any more.
@@ -75,16 +75,14 @@ class Outbox(threading.Thread):
         self.join(END_S)
 
     def run(self) -> None:
-        """Write what there is; then sleep until there is more."""
-        try:
-            ending = False
-            while not ending and not self.failed:
-                self._seen_all.acquire()
-                ending = self._ending  # looked at before the reports, so that none that came before it is left
-                while self._waiting and not self.failed:
-                    self._write_next()
-        finally:
-            self._release()
+        """Write what there is; then sleep until there is more, or until the end."""
+        ending = False
+        while not ending:
+            self._seen_all.acquire()
+            ending = self._ending  # looked at before the reports, so that none that came before it is left
+            while self._waiting and not self.failed:
+                self._write_next()
+        self._release()
 
     def _write_next(self) -> None:
         try:
@@ -113,9 +111,11 @@ class Outbox(threading.Thread):
         self._open_gate()
 
     def _open_gate(self) -> None:
-        # Only the one sender opens it, so nobody can have done so in between.
         if self._seen_all.locked():
-            self._seen_all.release()
+            try:  # noqa: SIM105 - suppress() would cost every tick a part of a microsecond
+                self._seen_all.release()
+            except RuntimeError:
+                pass  # the end has opened it in between, beside a calibration that was called off
 
     def _follow_caller(self) -> None:
         """Be scheduled as the loop is, which becomes a real-time thread only after it has opened its device.

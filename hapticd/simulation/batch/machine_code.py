@@ -24,7 +24,7 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
     memo = {law.step: compiled_step(law)}
     loop = compiled(bound(dict(switches), law.step, EnergyLedger.update), memo)
 
-    @njit(**OPTIONS)  # type: ignore[untyped-decorator]
+    @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def one(at: Any, arrays: Any) -> None:
         plant = on_stack(arrays.plants[at])
         state = on_stack(arrays.loops[at])
@@ -54,7 +54,7 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
         arrays.law_states[at] = law_state
         arrays.ledgers[at] = ledger
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]
+    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def sweep(first: Any, stop: Any, arrays: Any) -> None:
         for at in prange(first, stop):
             one(at, arrays)

@@ -82,9 +82,9 @@ def recorded(state: PlantState, params: PlantParams, buffers: Buffers, t_s: floa
     from_s = buffers.points_s[at]
     from_n = buffers.points_n[at]
     if at == last or t_s <= from_s:
-        return from_n  # type: ignore[no-any-return]
+        return from_n  # type: ignore[no-any-return]  # an array has no type for its elements
     share = (t_s - from_s) / (buffers.points_s[at + 1] - from_s)
-    return from_n + share * (buffers.points_n[at + 1] - from_n)  # type: ignore[no-any-return]
+    return from_n + share * (buffers.points_n[at + 1] - from_n)  # type: ignore[no-any-return]  # an array has no type for its elements
 
 
 def recorded_points(options: SimulationOptions) -> tuple[list[float], list[float]]:

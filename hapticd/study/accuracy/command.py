@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hapticd.config.loading import load
 from hapticd.contracts.errors import ConfigError
+from hapticd.progress import progress_bar
 from hapticd.share import directory
 from hapticd.study.grid.output import require_extra, require_folder, write
 
@@ -52,8 +49,8 @@ def command(
     from hapticd.study.accuracy.plot import draw
     from hapticd.study.accuracy.study import steps, study
 
-    with _progress(steps(loaded)) as progress:
-        found = study(loaded, duration, below, progress)
+    with progress_bar(steps(loaded), "starting", 30) as tell:
+        found = study(loaded, duration, below, lambda what: tell(description=what, advance=1))
         for file, content in zip(_FILES, (found.csv(), found.json(), draw(found)), strict=True):
             write(output / file, content)
     if as_json:
@@ -70,13 +67,3 @@ def command(
     for sentence in found.sentences():
         console.print(sentence, markup=False)
     console.print(f"{output}: {', '.join(_FILES)}", soft_wrap=True, markup=False)
-
-
-@contextmanager
-def _progress(steps: int) -> Iterator[Callable[[str], None]]:
-    """A bar on standard error where somebody looks at it."""
-    columns = (TextColumn("{task.description:30}"), BarColumn(), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as shown:
-        task = shown.add_task("starting", total=steps)
-        yield lambda what: shown.update(task, description=what, advance=1)

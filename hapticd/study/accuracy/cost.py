@@ -61,7 +61,7 @@ def single_precision_ratio(ticks: int = 200_000) -> float:
     """Cost of the exact step with a wall in single precision over double, both as machine code; 1 saves nothing."""
 
     @njit
-    def steps(x, v, x_per_v, x_per_f, v_per_v, v_per_f, stiffness, ticks):  # type: ignore[no-untyped-def]
+    def steps(x, v, x_per_v, x_per_f, v_per_v, v_per_f, stiffness, ticks):  # type: ignore[no-untyped-def]  # numba finds the types
         for _ in range(ticks):
             f = -1.0 - stiffness * x  # pressed, lest it decays into denormals
             x, v = x + (v * x_per_v + f * x_per_f), v * v_per_v + f * v_per_f

@@ -220,7 +220,7 @@ def balances(traces: np.ndarray[Any, Any], runs: Sequence[dict[str, float]]) -> 
 def _machine_code() -> Any:
     one = compiled(balance)
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]
+    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def sweep(traces: Any, runs: Any, found: Any) -> None:
         for at in prange(len(runs)):
             one(traces[at], on_stack(runs[at]), found[at])

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from hapticd.contracts.errors import ConfigError
+from hapticd.progress import progress_bar
 from hapticd.study.grid.output import require_cluster, require_extra, require_folder, require_memory, write
 
 _FILES = ("extremes.html", "extremes.json", "extremes.png")
@@ -67,9 +67,8 @@ def command(
         table = plan.table(run(job, journal, "extremes", cluster))
         days = []
         if ticks:
-            with Progress(console=Console(stderr=True)) as shown:
-                task = shown.add_task("a day", total=ticks)
-                days = run_days(ticks, lambda done: shown.update(task, completed=done))
+            with progress_bar(ticks, "a day") as tell:
+                days = run_days(ticks, lambda done: tell(completed=done))
         found = report(plan, table, days)
         picture = draw(found)
         repeat = f"hapticd study extremes --places {places} --seed {seed} --ticks {ticks}"

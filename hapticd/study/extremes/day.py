@@ -217,7 +217,7 @@ def add_product(sums: Any, at: int, left: float, right: float) -> None:
 def _sweep() -> Any:
     one = compiled(enter)
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]
+    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def sweep(traces: Any, stiffness: float, sums: Any) -> None:
         for at in prange(len(traces)):
             one(traces[at], stiffness, sums[at])

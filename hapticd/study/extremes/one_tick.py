@@ -170,7 +170,7 @@ def _stepper() -> Any:
 def _machine_code() -> Any:
     step, grow = compiled(_stepper()), compiled(log_growth)
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]
+    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def sweep(plants: Any, params: Any, walls: Any, units: Any, delays: Any, found: Any) -> None:
         for at in prange(len(plants)):
             size = delays[at] + 3

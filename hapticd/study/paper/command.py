@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from hapticd.progress import progress_bar
 from hapticd.study.grid.output import require_extra, require_folder
 
 FILES = ("report.html", "claims.json", "readings.json")
@@ -39,7 +36,11 @@ def command(
 
     extent = study.QUICK if quick else study.FULL
     repeat = "hapticd study paper" + (" --quick" if quick else "")
-    with _progress() as progress:
+    with progress_bar(1.0, "starting", 30) as tell:
+
+        def progress(what: str, done: float) -> None:
+            tell(description=what, advance=done)
+
         claims = study.publish(study.gather(extent, progress), output, extent.dots_per_inch, repeat, progress)
     if as_json:
         import json
@@ -59,17 +60,3 @@ def _show(claims: list[Any]) -> None:
         verdict = "[green]yes[/]" if claim.holds else "[red]no[/]"
         table.add_row(claim.source, claim.claim, claim.measured, verdict)
     console.print(table)
-
-
-@contextmanager
-def _progress() -> Iterator[Any]:
-    """A bar on standard error where somebody looks at it."""
-    columns = (TextColumn("{task.description:30}"), BarColumn(), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as shown:
-        task = shown.add_task("starting", total=1.0)
-
-        def tell(what: str, done: float) -> None:
-            shown.update(task, description=what, advance=done)
-
-        yield tell

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hapticd.config.loading import load
 from hapticd.contracts.errors import ConfigError
+from hapticd.progress import progress_bar
 from hapticd.share import directory
 from hapticd.study.grid.output import require_extra, write
 
@@ -53,8 +50,8 @@ def command(
     from hapticd.study.scene.study import steps, study
     from hapticd.study.scene.ticks import scene_ticks
 
-    with _progress(steps(loaded)) as progress:
-        found = study(loaded, duration, tolerance, progress)
+    with progress_bar(steps(loaded), "starting", 35) as tell:
+        found = study(loaded, duration, tolerance, lambda what: tell(description=what, advance=1))
         ticks = scene_ticks()
     if output is not None:
         write(output, report.minimal_text(found).encode())
@@ -74,13 +71,3 @@ def command(
         console.print("\n" + "\n".join(lines), markup=False, soft_wrap=True)
     elif found.left_out:
         console.print("--output FILE saves it as a configuration.")
-
-
-@contextmanager
-def _progress(steps: int) -> Iterator[Callable[[str], None]]:
-    """A bar on standard error where somebody looks; it ends early where few combinations have to be tried."""
-    columns = (TextColumn("{task.description:35}"), BarColumn(), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as shown:
-        task = shown.add_task("starting", total=steps)
-        yield lambda what: shown.update(task, description=what, advance=1)

@@ -6,6 +6,7 @@ python -m tests.drivers.forcedimension.exercise DIRECTORY [short-status]
 from __future__ import annotations
 
 import ctypes
+import functools
 import sys
 from pathlib import Path
 
@@ -22,7 +23,7 @@ def main(directory: Path, short_status: bool) -> None:
         driver.open()
         if short_status:  # what a binding with too little room would do
             driver._status = (ctypes.c_int * 16)()
-            driver._get_status = lambda driver=driver: driver._opened().dhdGetStatus(driver._status, 0)  # type: ignore[misc]
+            driver._get_status = functools.partial(driver._opened().dhdGetStatus, driver._status, 0)
         driver.calibrate()
         driver.enable()
         for tick in range(600):

@@ -167,8 +167,9 @@ def test_the_sdk_but_no_device(lab: Lab, bench: Bench) -> None:
     assert library[0] == "advice"
     assert f"Force Dimension SDK 3.17.5.0, {bench.directory}/libdrd.so.3: the system service may not look" in library[1]
     assert count == ("ok", "the SDK finds no device", "")
-    ((mark, text, _),) = lab.doctor("usb.devices")
-    assert (mark, "none is on the bus" in text) == ("problem", True)
+    ((mark, text, mend),) = lab.doctor("driver.devices")
+    assert (mark, text) == ("problem", "omega7 finds no device")
+    assert "plug it in" in mend
 
 
 def test_a_device_on_the_bus_that_the_sdk_does_not_see(lab: Lab, bench: Bench) -> None:
@@ -195,7 +196,7 @@ def test_a_device_but_no_permission(lab: Lab, bench: Bench, counted: bool) -> No
     shown = lab.hapticd("devices")
     assert "cannot be used" in shown
     assert RULE in " ".join(shown.replace("\\\n", " ").split())
-    ((mark, text, mend),) = lab.doctor("usb.devices")
+    ((mark, text, mend),) = lab.doctor("driver.devices")
     assert (mark, "may not open /dev/bus/usb/001/005" in text) == ("problem", True)
     assert "service install" in mend
 
@@ -232,6 +233,6 @@ def test_two_devices(lab: Lab, bench: Bench) -> None:
     assert "serial = ..." in mend
     lab.config.write_text(f"{lab.config.read_text()}serial = 1002\n")
     assert lab.doctor("driver.needs")[1][:2] == ("ok", "the SDK finds 2 devices")
-    assert [mark for mark, _, _ in lab.doctor("usb.devices")] == ["ok", "ok"]
+    assert [mark for mark, _, _ in lab.doctor("driver.devices")] == ["ok", "ok"]
     assert [bench.get("holder", device) for device in range(2)] == [0, 0]
     assert sum(bench.get("moves", device) for device in range(2)) == 0

@@ -140,7 +140,10 @@ def test_a_read_gives_the_newest_of_many_states(double: HidDouble) -> None:
 
 
 def test_a_write_that_stalls_costs_no_tick(double: HidDouble, enabled: HidRig) -> None:
-    """While the kernel holds one write, every read and write of the loop returns; then only the newest force goes."""
+    """While the kernel holds one write, every read and write of the loop returns; then only the newest force goes.
+
+    Which force is held depends on when the outbox gets the processor; that one is held and one is newest does not.
+    """
     enabled.read()
     double.catch_up(enabled)
     double.forces_un()
@@ -155,7 +158,7 @@ def test_a_write_that_stalls_costs_no_tick(double: HidDouble, enabled: HidRig) -
     double.tell("release")
     double.catch_up(enabled)
     held, newest = double.forces_un()
-    assert (held, newest) == (0, 10_000 * (STALLED_TICKS - 1))
+    assert held < newest == 10_000 * (STALLED_TICKS - 1)
     enabled.read()
     assert enabled.metrics[UNSENT] == STALLED_TICKS - 2
     wait_until(lambda: enabled.read().sequence and not enabled._silent, "an answer")
@@ -226,20 +229,27 @@ def test_a_rig_that_was_switched_off_and_on_is_a_new_one(double: HidDouble, enab
 
 
 def test_silence_trips_the_watchdog_until_somebody_enables_again(double: HidDouble, driver: HidRig) -> None:
-    double.set("silence_ms", 20.0)
+    """It is patient except where it is the question, since this computer may be busy for longer than it waits."""
+    patient_ms, silence_ms = 5000.0, 20.0
+    double.set("silence_ms", silence_ms)
     driver.open()
+    double.set("silence_ms", patient_ms)
     driver.enable()
     driver.write([0.5])
     double.catch_up(driver)
+    assert double.look().force_un == 500_000
+    double.set("silence_ms", silence_ms)
     wait_until(lambda: double.look().force_un == 0, "the watchdog")
     assert double.forces_un() == [500_000]
     with pytest.raises(DeviceFaultError, match="watchdog heard no command for 20 ms"):
         tick(driver, 1000)
     assert double.look().force_un == 0
+    double.set("silence_ms", patient_ms)
     driver.disable()
     driver.enable()
     driver.write([0.5])
-    wait_until(lambda: 500_000 in double.forces_un(), "the force")
+    double.catch_up(driver)
+    assert double.look().force_un == 500_000
 
 
 def test_a_fault_of_the_rig_says_what_it_is(double: HidDouble, enabled: HidRig) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Iterable
 
@@ -13,8 +14,11 @@ from hapticd.contracts.errors import DeviceDisconnectedError
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.hid_rig_discovery import HidDevice, OpenHid
 from hapticd_drivers.rig.hid_rig_link import MOST_READ, HidLink
+from tests.daemon.running import PATIENCE_S
 
 REPORT_SIZE = 64
+GRACE_S = 0.2
+"""What a link that freed its handle too early would need much less of [s]."""
 
 
 class Handle:
@@ -124,3 +128,40 @@ def test_a_handle_is_left_alone_after_its_first_error() -> None:
             link.receive()
     assert len(reads) == 1
     link.close()
+
+
+class SlowHandle(Handle):
+    """Its reads take until the test lets them end."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reading = threading.Event()
+        self.read_ends = threading.Event()
+        self.closed = threading.Event()
+
+    def read(self, most: int, timeout_ms: int) -> list[int]:
+        self.reading.set()
+        assert self.read_ends.wait(PATIENCE_S)
+        return super().read(most, timeout_ms)
+
+    def close(self) -> None:
+        self.closed.set()
+
+
+def test_a_handle_is_not_freed_under_a_read_and_not_read_after_that() -> None:
+    """A calibration that was called off may still wait for an answer when the loop closes the rig."""
+    handle = SlowHandle()
+    link = link_to(handle)
+    reader = threading.Thread(target=link.wait, args=(0.01,))
+    closer = threading.Thread(target=link.close)
+    reader.start()
+    assert handle.reading.wait(PATIENCE_S)
+    closer.start()
+    assert not handle.closed.wait(GRACE_S)
+    handle.read_ends.set()
+    assert handle.closed.wait(PATIENCE_S)
+    reader.join()
+    closer.join()
+    with pytest.raises(DeviceDisconnectedError):
+        link.receive()
+    assert handle.reads == 1

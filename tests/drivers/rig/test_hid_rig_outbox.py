@@ -14,6 +14,9 @@ from hypothesis import strategies as st
 from hapticd_drivers.rig.hid_rig_outbox import LOOK_EVERY_TICKS, MOST_WAITING, Outbox
 from tests.daemon.running import PATIENCE_S, wait_until
 
+GRACE_S = 0.2
+"""What an outbox that gave its device back too early would need much less of [s]."""
+
 
 class SlowDevice:
     """Writes one report each time it is let; `written` is what it took, in order."""
@@ -37,6 +40,10 @@ class SlowDevice:
         self.outbox.send_order(b"stalled")
         assert self._begun.acquire(timeout=PATIENCE_S)
 
+    def send(self, report: bytes) -> None:
+        """Send it as what its first word says: tick, order or question."""
+        getattr(self.outbox, f"send_{report.split()[0].decode()}")(report)
+
     def go_on(self) -> None:
         """From now on every write ends at once."""
         for _ in range(1000):
@@ -56,41 +63,32 @@ def slow() -> Iterator[SlowDevice]:
     made.end()
 
 
-def test_of_many_forces_only_the_newest_goes_out(slow: SlowDevice) -> None:
-    for tick in range(50):
-        slow.outbox.send_tick(b"force %d" % tick)
+@pytest.mark.parametrize(
+    ("sends", "written", "dropped"),
+    [
+        (["tick 1", "tick 2", "tick 3", "tick 4"], ["tick 4"], 3),
+        (["tick", "order 1", "order 2", "tick poll"], ["order 1", "order 2", "tick poll"], 0),
+        (["tick 1", "question", "question one too many", "tick 2"], ["tick 1", "question", "tick 2"], 1),
+    ],
+    ids=["of many forces the newest", "an order throws the force before it away", "a question replaces no force"],
+)
+def test_of_what_waits_for_the_device_goes_out(
+    slow: SlowDevice, sends: list[str], written: list[str], dropped: int
+) -> None:
+    for report in sends:
+        slow.send(report.encode())
     slow.end()
-    assert slow.written == [b"stalled", b"force 49"]
-    assert slow.outbox.dropped == 49
-
-
-def test_an_order_throws_away_the_force_before_it(slow: SlowDevice) -> None:
-    slow.outbox.send_tick(b"force")
-    slow.outbox.send_order(b"disable")
-    slow.outbox.send_order(b"again")
-    slow.outbox.send_tick(b"poll")
-    slow.end()
-    assert slow.written == [b"stalled", b"disable", b"again", b"poll"]
-    assert slow.outbox.dropped == 0
-
-
-def test_a_question_does_not_replace_a_force(slow: SlowDevice) -> None:
-    slow.outbox.send_tick(b"force")
-    slow.outbox.send_question(b"ping")
-    slow.outbox.send_tick(b"next")
-    slow.outbox.send_question(b"one too many")
-    slow.end()
-    assert slow.written == [b"stalled", b"force", b"ping", b"next"]
-    assert slow.outbox.dropped == 1
+    assert slow.written == [b"stalled", *(report.encode() for report in written)]
+    assert slow.outbox.dropped == dropped
 
 
 @given(st.lists(st.sampled_from(["tick", "order", "question"]), max_size=MOST_WAITING))
 def test_whatever_is_sent_arrives_in_order_with_every_order_and_the_newest_force(kinds: list[str]) -> None:
     slow = SlowDevice()
     slow.stall()
-    sent = [b"%d %s" % (number, kind.encode()) for number, kind in enumerate(kinds)]
-    for report, kind in zip(sent, kinds, strict=True):
-        getattr(slow.outbox, f"send_{kind}")(report)
+    sent = [b"%s %d" % (kind.encode(), number) for number, kind in enumerate(kinds)]
+    for report in sent:
+        slow.send(report)
     assert slow.written == [b"stalled"]
     slow.end()
     arrived = slow.written[1:]
@@ -117,11 +115,23 @@ def test_nothing_goes_out_after_a_write_that_failed() -> None:
     slow.stall()
     slow.outbox.send_order(b"lost")
     slow.go_on()
-    wait_until(slow.released.is_set, "the end of the outbox")
-    assert slow.outbox.failed
-    assert slow.written == [b"stalled"]
+    wait_until(lambda: slow.outbox.failed, "the failure")
     slow.outbox.send_tick(b"nobody hears")
-    slow.outbox.end()
+    slow.end()
+    assert slow.written == [b"stalled"]
+
+
+def test_after_a_write_that_failed_nothing_is_released_before_the_end() -> None:
+    """The loop may be reading from the handle that releasing it frees."""
+    slow = SlowDevice()
+    slow.result = -1
+    slow.stall()
+    slow.go_on()
+    wait_until(lambda: slow.outbox.failed, "the failure")
+    slow.outbox.join(GRACE_S)
+    assert slow.outbox.is_alive()
+    assert not slow.released.is_set()
+    slow.end()
 
 
 @pytest.mark.parametrize(("send", "times"), [("send_order", 1), ("send_tick", LOOK_EVERY_TICKS + 1)])
