@@ -1,4 +1,4 @@
-"""What holds for every test: in CI nothing is skipped, since a skipped test proves nothing."""
+"""What holds for every test: in CI nothing is skipped, since a skipped test proves nothing; examples may be slow."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ import signal
 from collections.abc import Generator
 
 import pytest
+from hypothesis import settings
 
 IN_CI = os.environ.get("CI") == "true"
+
+# On a busy machine any example may be slow. The rest stays Hypothesis's own: in CI the same examples every time.
+settings.register_profile("unhurried", deadline=None)
+settings.load_profile("unhurried")
 
 
 def pytest_configure() -> None:

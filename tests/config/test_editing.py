@@ -132,7 +132,7 @@ TOML_LINES = st.sampled_from(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, max_examples=300)
 @given(lines=st.lists(TOML_LINES, max_size=12), law=st.sampled_from(["none", "tdpa", "energy-cycle"]))
 def test_whatever_the_file_says_it_is_edited_rightly_or_refused(lines: list[str], law: str) -> None:
     text = "\n".join(lines)

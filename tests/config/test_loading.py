@@ -132,13 +132,11 @@ VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.di
 
 
 @given(st.dictionaries(KEYS, VALUES, max_size=6))
-@settings(deadline=None)
 def test_any_toml_is_accepted_or_refused(tables: dict[str, object]) -> None:
     accepted_or_refused("any.toml", lambda: parse(tomlkit.dumps(tables), "any.toml"))
 
 
 @given(st.data())
-@settings(deadline=None)
 def test_a_file_with_one_wrong_value_is_accepted_or_refused(data: st.DataObject) -> None:
     lines = REFERENCE.splitlines()
     settable = [number for number, line in enumerate(lines) if " = " in line and not line.startswith("#")]

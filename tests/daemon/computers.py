@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 from tests.daemon.running import wait_until
 
 
@@ -23,17 +25,19 @@ class Computers:
 
     first: Sequence[str] = ()
     second: Sequence[str] = ()
-    address: str = "127.0.0.2"
+    address: str = "127.0.0.2"  # with nothing before its commands both are this one, by another of its addresses
 
 
 @contextlib.contextmanager
 def two_computers() -> Iterator[Computers]:
-    """Two network namespaces, or this computer twice, which reaches itself by another of its addresses."""
+    """Two network namespaces; the test is skipped where this user may not make them."""
     with contextlib.ExitStack() as undo:
         try:
             computers = _cabled(undo)
-        except (FileNotFoundError, subprocess.CalledProcessError):
-            computers = Computers()
+        except FileNotFoundError as error:
+            pytest.skip(f"no network namespaces: {error.filename} is not installed")
+        except subprocess.CalledProcessError as error:
+            pytest.skip(f"no network namespaces: {' '.join(error.cmd)}: {error.stderr.decode().strip()}")
         yield computers
 
 

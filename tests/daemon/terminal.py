@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pty
 import select
+import signal
 import subprocess
 import time
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
 
-from tests.daemon.running import PATIENCE_S
+from tests.daemon.running import PATIENCE_S, wait_until
 
 
 class Terminal:
@@ -16,7 +21,10 @@ class Terminal:
 
     def __init__(self, *command: str, environment: dict[str, str]) -> None:
         ours, theirs = pty.openpty()
-        environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24", **environment}
+        self._mark = f"TERMINAL_OF_A_TEST={uuid.uuid4()}"
+        name, _, value = self._mark.partition("=")
+        screen = {"TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"}
+        environment = {**os.environ, **screen, name: value, **environment}
         self.process = subprocess.Popen(
             ("setsid", "--ctty", *command), stdin=theirs, stdout=theirs, stderr=theirs, env=environment
         )
@@ -48,7 +56,23 @@ class Terminal:
         self._descriptor = -1
 
     def close(self) -> None:
+        """End whatever was started here: a daemon that should have ended with the command, but did not, as well."""
         self.process.kill()
         self.process.wait()
+        wait_until(lambda: not self._kill_rest(), "the end of all that the command has started")
         if self._descriptor >= 0:
             self.hang_up()
+
+    def _kill_rest(self) -> bool:
+        """Kill processes whose environment comes from here, also those in sessions of their own; whether any was."""
+        rest = list(self._marked())
+        for pid in rest:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        return bool(rest)
+
+    def _marked(self) -> Iterator[int]:
+        for environment in Path("/proc").glob("[0-9]*/environ"):
+            with contextlib.suppress(OSError):  # ended, or somebody else's
+                if self._mark.encode() in environment.read_bytes().split(b"\0"):
+                    yield int(environment.parent.name)

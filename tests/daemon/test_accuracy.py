@@ -10,13 +10,15 @@ import pytest
 
 from hapticd.cli.picture import Known, frame
 from hapticd.config.loading import load, parse
+from hapticd.contracts.record import TickRecord
 from hapticd.control.fitting import track
+from hapticd.control.shared import RECORDS
 from hapticd.share import directory
 from hapticd.simulation.options import SimulationOptions
 from hapticd.study.played import play
 from hapticd.study.scene.study import study
 from hapticd.telemetry.status import Status
-from tests.daemon.running import Daemon, Subscriber
+from tests.daemon.running import Daemon, Subscriber, all_records, wait_until
 
 TICKS = 2500
 CONFIG = """
@@ -35,33 +37,34 @@ stiffness_n_per_m = 2000.0
 """
 
 
+def first_ticks(daemon: Daemon, count: int) -> list[TickRecord]:
+    """So many ticks from the very first on, out of the ring, since a subscriber comes too late for them."""
+    memory = daemon.memory()
+    wait_until(lambda: memory.words[RECORDS] >= count, f"{count} ticks")
+    records = all_records(memory)[:count]
+    memory.close()
+    assert [record.seq for record in records] == list(range(count))
+    return records
+
+
 @pytest.mark.parametrize(("position_m", "least_error_m"), [(1e-6, 1e-9), (3e-4, 1e-5)])
 def test_the_daemon_errs_by_no_more_than_was_allowed(position_m: float, least_error_m: float) -> None:
     """And by something: the model that runs is not the full one."""
     full = parse(CONFIG.format(accuracy=""), "full.toml")
     assert isinstance(full.options, SimulationOptions)
     exact = track(full, full.options, TICKS)
-    errors_m = []
-    errors_j = []
     text = CONFIG.format(accuracy=f"accuracy = {{ position_m = {position_m}, over_s = 2.5 }}")
     with Daemon(text) as daemon, Subscriber(daemon.wait_ready().endpoint) as subscriber:
-        told = ""
-        for topic, fields in subscriber.maps():
-            if topic == "hapticd/status":
-                told = fields["accuracy"]
-            if topic == "hapticd/position" and fields["seq"] < TICKS:
-                errors_m.append(abs(fields["position_m"][0] - exact.x_m[fields["seq"]]))
-            if topic == "hapticd/energy" and fields["seq"] < TICKS:
-                errors_j.append(abs(fields["energy_j"] - exact.energy_j[fields["seq"]]))
-            if fields["seq"] >= TICKS and told:
-                break
+        records = first_ticks(daemon, TICKS)
+        told = subscriber.until("hapticd/status")["accuracy"]
         daemon.config.write_text(text.replace("stiffness_n_per_m = 2000.0", "stiffness_n_per_m = 2100.0"))
         os.kill(daemon.process.pid, signal.SIGHUP)
         for topic, fields in subscriber.maps():
             if topic == "hapticd/status" and fields["wall_stiffness_n_per_m"] == [2100.0]:
                 assert fields["accuracy"].startswith(told + "; chosen for configuration ")
                 break
-    assert len(errors_m) > TICKS // 2
+    errors_m = [abs(record.position_m[0] - exact.x_m[record.seq]) for record in records]
+    errors_j = [abs(record.energy_j - exact.energy_j[record.seq]) for record in records]
     assert least_error_m < max(errors_m) <= position_m + 4e-9  # the sensor's noise, which the true position has not
     assert max(errors_j) > 0.0
     assert told.startswith("exact step without ")
@@ -76,21 +79,12 @@ def test_the_smallest_model_of_a_scene_answers_in_the_daemon_as_the_full_one() -
     full = load(directory("config") / "every-term.toml")
     scene = study(full, 1.5, tolerance, lambda _: None)
     exact = play(full, 1.5)
-    off = worst_j = last_n = depth_m = 0.0
-    seen = 0
-    with Daemon(scene.minimal.text) as daemon, Subscriber(daemon.wait_ready().endpoint) as subscriber:
-        for topic, fields in subscriber.maps():
-            seq = fields["seq"]
-            if seq >= ticks:
-                break
-            if topic == "hapticd/position":
-                off += (fields["force_n"][0] - exact.force_n[seq]) ** 2
-                last_n, depth_m = fields["force_n"][0], -fields["position_m"][0]
-                seen += 1
-            if topic == "hapticd/energy":
-                worst_j = max(worst_j, abs(fields["energy_j"] - exact.energy_j[seq]))
+    with Daemon(scene.minimal.text) as daemon:
+        records = first_ticks(daemon.wait_ready(), ticks)
+    off = sum((record.force_n[0] - exact.force_n[record.seq]) ** 2 for record in records)
     size = sum(force_n * force_n for force_n in exact.force_n)
-    assert seen > ticks // 2
+    worst_j = max(abs(record.energy_j - exact.energy_j[record.seq]) for record in records)
+    last_n, depth_m = records[-1].force_n[0], -records[-1].position_m[0]
     assert 0.0 < math.sqrt(off / size) <= tolerance
     assert 0.0 < worst_j <= tolerance * max(map(abs, exact.energy_j))
     assert last_n / depth_m == pytest.approx(exact.displayed_n_per_m, rel=tolerance)

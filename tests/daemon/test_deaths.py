@@ -11,6 +11,7 @@ from pathlib import Path
 
 from hapticd.contracts.event import EventCode
 from hapticd.contracts.record import TickRecord
+from hapticd.control.shared import RECORDS
 from tests.daemon.running import Daemon, Subscriber, all_records, gone, wait_until
 
 PRESSED = """
@@ -53,8 +54,10 @@ def pressing(daemon: Daemon) -> None:
                 return
 
 
-def largest_step_n(records: Sequence[TickRecord]) -> float:
-    return max(abs(after.force_n[0] - before.force_n[0]) for before, after in pairwise(records))
+def ramped_out(records: Sequence[TickRecord]) -> bool:
+    """Whether the force went to zero in many small steps and stayed there."""
+    steps = [abs(after.force_n[0] - before.force_n[0]) for before, after in pairwise(records)]
+    return records[-1].force_n == (0.0,) and max(steps) < 1.0 and sum(0.0 < r.force_n[0] < 2.9 for r in records) > 20
 
 
 def nothing_left(daemon: Daemon) -> bool:
@@ -73,9 +76,8 @@ def test_a_killed_supervisor_takes_the_force_with_it(record_property: Report) ->
         wait_until(lambda: gone(pid), "the control process to end")
         record_property("exit_after_ms", (time.monotonic_ns() - killed_ns) * 1e-6)
         after = [record for record in all_records(memory) if record.deadline_ns > killed_ns]
-        assert after[-1].force_n == (0.0,)
         assert len(after) <= 100, "at 1 kHz the force must be out within 100 ticks"
-        assert largest_step_n(after) < 1.0, "a ramp, not a step"
+        assert ramped_out(after)
         memory.close()
 
 
@@ -90,9 +92,12 @@ def test_a_supervisor_that_sleeps_for_a_while_costs_the_loop_nothing() -> None:
     ):
         for daemon in (brief, long, strict):
             pressing(daemon)
+        loops = {daemon: daemon.memory() for daemon in (brief, long, strict)}
         for daemon in (brief, long, strict):
             daemon.process.send_signal(signal.SIGSTOP)
-        time.sleep(5.0)
+        stopped_at = {daemon: memory.words[RECORDS] for daemon, memory in loops.items()}
+        wait_until(lambda: loops[brief].words[RECORDS] > stopped_at[brief] + 3000, "ticks without a supervisor")
+        resumed_at = loops[brief].words[RECORDS]
         brief.process.send_signal(signal.SIGCONT)
         strict.process.send_signal(signal.SIGCONT)
 
@@ -101,25 +106,30 @@ def test_a_supervisor_that_sleeps_for_a_while_costs_the_loop_nothing() -> None:
             if topic == "hapticd/position":
                 assert last in (-1, fields["seq"] - 1), "no tick may be lost in a ring that holds eight seconds"
                 last = fields["seq"]
-                if last > 8000:
+                if last > resumed_at:
                     break
             assert topic != "hapticd/event" or fields["code"] < 200 or fields["code"] >= 300
 
         event = from_strict.until("hapticd/event", code=EventCode.SUPERVISOR_STALLED)
-        after = [record for record in all_records(strict.memory()) if record.seq > event["seq"] + 60]
+        after = [record for record in all_records(loops[strict]) if record.seq > event["seq"] + 60]
         assert after
         assert all(record.force_n == (0.0,) for record in after)
 
-        time.sleep(4.5)  # more than the ring holds
+        wait_until(
+            lambda: loops[long].words[RECORDS] > stopped_at[long] + loops[long].slots, "more ticks than the ring holds"
+        )
         long.process.send_signal(signal.SIGCONT)
         dropped = from_long.until("hapticd/event", code=EventCode.RING_DROPPED)
         status = from_long.until("hapticd/status")
         assert dropped["text"].startswith(f"{status['ring_drops']} ticks")
         assert status["armed"]
+        for memory in loops.values():
+            memory.close()
 
 
 def test_a_killed_control_process_ends_the_service(record_property: Report) -> None:
-    with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
+    with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint) as subscriber:
+        subscriber.until("hapticd/status")
         pressing(daemon)
         pid = daemon.control_pid()
         killed_ns = time.monotonic_ns()
@@ -133,7 +143,8 @@ def test_a_killed_control_process_ends_the_service(record_property: Report) -> N
 
 
 def test_a_stopped_control_process_is_killed_and_the_device_released(record_property: Report) -> None:
-    with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
+    with Daemon(PRESSED).wait_ready() as daemon, Subscriber(daemon.endpoint) as subscriber:
+        subscriber.until("hapticd/status")
         pressing(daemon)
         pid = daemon.control_pid()
         stopped_ns = time.monotonic_ns()
@@ -171,9 +182,7 @@ def test_sigterm_ramps_the_force_out_and_ends_well(record_property: Report) -> N
         assert daemon.wait_exit() == 0
         record_property("exit_after_ms", (time.monotonic_ns() - told_ns) * 1e-6)
         after = [record for record in all_records(memory) if record.deadline_ns > told_ns]
-        assert after[-1].force_n == (0.0,)
-        assert sum(0.0 < record.force_n[0] < 2.9 for record in after) > 20
-        assert largest_step_n(after) < 1.0, "a ramp, not a step"
+        assert ramped_out(after)
         assert nothing_left(daemon)
         memory.close()
 

@@ -9,7 +9,7 @@ import subprocess
 
 import pytest
 
-from tests.daemon.running import HAPTICD, Daemon, Subscriber
+from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber
 from tests.daemon.test_deaths import PRESSED
 
 SETPRIV = shutil.which("setpriv")
@@ -34,7 +34,7 @@ def test_a_second_daemon_of_the_same_instance_is_refused_and_the_first_goes_on()
             env=environment,
             capture_output=True,
             text=True,
-            timeout=30,
+            timeout=PATIENCE_S,
             check=False,
         )
         assert outcome.returncode == 1

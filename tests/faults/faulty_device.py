@@ -87,7 +87,7 @@ class Faulty(Loopback):
             case "jump":
                 sample.position_m[0] -= 3e-3
             case "garbage":
-                sample.position_m[0] = "here"  # type: ignore[call-overload]
+                sample.position_m[0] = "here"  # type: ignore[call-overload]  # somebody's own driver
         return sample
 
     def _write(self, force_n: Sequence[float]) -> None:

@@ -69,8 +69,8 @@ def period_with_friction(
         def standstill(_: float, state: list[float], way: float = way) -> float:
             return float(way * state[1])
 
-        standstill.terminal = True  # type: ignore[attr-defined]
-        standstill.direction = -1.0  # type: ignore[attr-defined]
+        standstill.terminal = True  # type: ignore[attr-defined]  # where scipy looks for it
+        standstill.direction = -1.0  # type: ignore[attr-defined]  # the same
         nudge = 0.0
         if v == 0.0:  # step off the surface, where the event would fire at once
             nudge = 1e-7 * (period - t)

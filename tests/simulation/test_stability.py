@@ -109,8 +109,11 @@ def test_spring_and_damper_without_delay_follow_the_closed_form(share: float) ->
     limit = 2.0 * b / T * (1.0 - share / 2.0) / (1.0 + share / 2.0)
     assert limit <= 4.0 * (math.sqrt(2.0) - 1.0) ** 2 * mass / T**2 * (1.0 + 1e-12)
     for factor, stable in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
-        k = factor * limit
-        assert (growth({"mass_kg": mass}, T, lambda x, v, k=k: -k * x - b * v) <= 1.0) is stable  # type: ignore[misc]
+
+        def force(x: float, v: float, k: float = factor * limit) -> float:
+            return -k * x - b * v
+
+        assert (growth({"mass_kg": mass}, T, force) <= 1.0) is stable
 
 
 @pytest.mark.parametrize(("share", "calm"), [(0.10, False), (0.25, False), (0.45, False), (0.51, True)])

@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,27 +24,31 @@ from hapticd.study.grid.output import as_csv, as_json, require_extra, require_fo
 
 ROOT = Path(__file__).parents[2]
 BLOCKS = 40
+DONE = 4
+"""Blocks that are done before the gate is opened."""
 
 
 def work(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
-    """Rows that every process makes alike, and a line that says who made them."""
+    """Rows that every process makes alike, and a line that says who made them; all but a few wait for the gate."""
     with Path(spec["diary"]).open("a") as diary:
         diary.write(f"{os.getpid()} {block}\n")
-    time.sleep(spec["pause_s"])
-    return [[block / 3.0, float("nan"), int(cell)] for cell in range(2)]
+    while block >= DONE and not Path(spec["gate"]).exists():
+        time.sleep(0.005)
+    return [[block / spec["divisor"], float("nan"), int(cell)] for cell in range(2)]
 
 
-def job(folder: Path, pause_s: float = 0.0) -> Job:
-    return Job(work, {"diary": str(folder / "diary"), "pause_s": pause_s}, (2,) * BLOCKS, ())
+def job(folder: Path, divisor: float) -> Job:
+    spec = {"diary": str(folder / "diary"), "gate": str(folder / "gate"), "divisor": divisor}
+    return Job(work, spec, (2,) * BLOCKS, ())
 
 
 def diary(folder: Path) -> list[list[str]]:
     return [line.split() for line in (folder / "diary").read_text().splitlines()]
 
 
-def do(folder: Path, pause_s: float = 0.0) -> list[list[Row]]:
-    with kept(job(folder, pause_s), folder / "journal") as journal:
-        return run(job(folder, pause_s), journal, "test")
+def do(folder: Path, divisor: float = 3.0) -> list[list[Row]]:
+    with kept(job(folder, divisor), folder / "journal") as journal:
+        return run(job(folder, divisor), journal, "test")
 
 
 def read(path: Path, fingerprint: str, fresh: bool = False) -> dict[int, list[Row]]:
@@ -51,39 +57,42 @@ def read(path: Path, fingerprint: str, fresh: bool = False) -> dict[int, list[Ro
     return journal.done
 
 
-def started(folder: Path) -> subprocess.Popen[str]:
-    """The study in a process of its own, as soon as some blocks are done."""
-    script = f"from pathlib import Path; from tests.study.test_grid import do; do(Path({str(folder)!r}), 0.05)"
-    process = subprocess.Popen([sys.executable, "-c", script], cwd=ROOT, stderr=subprocess.PIPE, text=True)
-    journal = folder / "journal"
-    while process.poll() is None and (not journal.exists() or journal.read_bytes().count(b"\n") < 4):
-        time.sleep(0.01)
-    assert process.poll() is None
-    return process
+@contextmanager
+def started(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """The study in a process of its own, which waits at the gate in the middle of a block."""
+    script = f"from pathlib import Path; from tests.study.test_grid import do; do(Path({str(folder)!r}))"
+    with subprocess.Popen([sys.executable, "-c", script], cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            while not (folder / "diary").exists() or len(diary(folder)) <= DONE:
+                assert process.poll() is None, process.communicate()
+                time.sleep(0.01)
+            yield process
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_what_was_done_before_a_kill_is_not_done_again(tmp_path: Path, number: signal.Signals) -> None:
-    process = started(tmp_path)
-    process.send_signal(number)
-    process.communicate(timeout=30)
-    before = {block for _, block in diary(tmp_path)[:-1]}  # the last one may have been cut off
-    assert 3 <= len(before) < BLOCKS
+    with started(tmp_path) as process:
+        process.send_signal(number)
+        process.communicate(timeout=60)
+    (tmp_path / "gate").touch()
 
-    rows = do(tmp_path, 0.05)
+    rows = do(tmp_path)
 
     after = [block for pid, block in diary(tmp_path) if pid == str(os.getpid())]
-    assert not before & set(after)
+    assert after == [str(block) for block in range(DONE, BLOCKS)]
+    assert [[row[0], row[2]] for row in rows[2]] == [[2 / 3.0, 0], [2 / 3.0, 1]]
     assert [[row[0], row[2]] for row in rows[7]] == [[7 / 3.0, 0], [7 / 3.0, 1]]
     assert len(rows) == BLOCKS
     assert not (tmp_path / "journal").exists()
 
 
 def test_an_interrupt_says_what_is_kept_and_where(tmp_path: Path) -> None:
-    process = started(tmp_path)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=30)
-    assert "cells are kept in" in said
+    with started(tmp_path) as process:
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert f"interrupted: {2 * DONE} of {2 * BLOCKS} cells are kept in {tmp_path / 'journal'}" in said
     assert "the same command goes on from there" in said
     assert (tmp_path / "journal").exists()
     assert InterruptedStudyError.exit_code == 130
@@ -132,11 +141,11 @@ def test_two_studies_do_not_write_into_one_folder(tmp_path: Path) -> None:
 
 
 def test_other_settings_are_another_study(tmp_path: Path) -> None:
-    process = started(tmp_path)
-    process.kill()
-    process.communicate(timeout=30)
+    with started(tmp_path) as process:
+        process.kill()
+    (tmp_path / "gate").touch()
     with pytest.raises(ConfigError, match="other settings"):
-        do(tmp_path, 0.07)
+        do(tmp_path, divisor=7.0)
 
 
 @given(cells=st.integers(1, 500), most=st.integers(1, 60))

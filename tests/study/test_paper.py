@@ -117,7 +117,7 @@ def calm_literal(evidence: Evidence) -> None:
 
 def soften(evidence: Evidence) -> None:
     run = evidence.figures["fig9-18"]
-    evidence.figures["fig9-18"] = replace(run, stiffness_error=-0.04)  # type: ignore[index]
+    evidence.figures["fig9-18"] = replace(run, stiffness_error=-0.04)  # type: ignore[index]  # nobody else may
 
 
 def drain(evidence: Evidence) -> None:

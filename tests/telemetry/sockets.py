@@ -25,6 +25,9 @@ PATIENCE_S = 20.0
 
 EPOCH_OFFSET_NS = 1_700_000_000_000_000_000
 
+END = "end"
+"""A topic that no publisher has: what a subscriber reads up to."""
+
 
 class Wire:
     """A publisher on an ipc path of its own, with status already said, and subscribers that are known to be heard."""
@@ -53,12 +56,17 @@ class Wire:
 
     def subscribe(self, *topics: str, high_water: int = 0) -> Subscriber:
         """A subscriber whose subscriptions the publisher has seen."""
-        wanted = served(self.publisher) + (len(topics) or 1)
+        prefixes = (*(topics or ("hapticd/",)), END)
+        wanted = served(self.publisher) + len(prefixes)
         socket = self.socket(zmq.SUB, self.endpoint, high_water)
-        for topic in topics or ("hapticd/",):
-            socket.setsockopt(zmq.SUBSCRIBE, topic.encode())
+        for prefix in prefixes:
+            socket.setsockopt(zmq.SUBSCRIBE, prefix.encode())
         wait_until(lambda: served(self.publisher) >= wanted, "subscriptions")
-        return Subscriber(socket)
+        return Subscriber(socket, self.say)
+
+    def say(self, topic: str, payload: Any) -> None:
+        """Publish what a publisher would not."""
+        self.publisher._socket.send_multipart((topic.encode(), msgpack.packb(payload)))
 
     def socket(self, kind: int, endpoint: str, high_water: int = 0) -> zmq.Socket[bytes]:
         """A connected socket that is closed with everything else."""
@@ -76,24 +84,23 @@ class Wire:
 
 
 class Subscriber:
-    """Reads messages as the contract has them, and holds them to it."""
+    """Reads messages as the contract has them, and holds them to it.
 
-    def __init__(self, socket: zmq.Socket[bytes]) -> None:
+    Args:
+        socket: connected and subscribed.
+        say: publishes a message behind all others; without it there is no `waiting`.
+    """
+
+    def __init__(self, socket: zmq.Socket[bytes], say: Callable[[str, Any], None] | None = None) -> None:
         self.socket = socket
+        self._say = say
+        self._ends = 0
 
-    def message(self, patience_s: float = PATIENCE_S) -> tuple[str, list[dict[str, Any]]]:
+    def message(self) -> tuple[str, list[dict[str, Any]]]:
         """The next message."""
-        assert self.socket.poll(int(patience_s * 1000)), "nothing came"
-        frames = self.socket.recv_multipart(zmq.NOBLOCK)
-        assert len(frames) == 2
-        maps = msgpack.unpackb(frames[1])
-        assert isinstance(maps, list)
-        assert maps
-        for fields in maps:
-            assert isinstance(fields, dict)
-            assert isinstance(fields["timestamp"], float)
-            assert isinstance(fields["seq"], int)
-        return frames[0].decode(), maps
+        while (message := self._next())[0] == END:
+            pass  # an end that `waiting` has said once more than was needed
+        return message
 
     def until(self, topic: str, count: int) -> list[dict[str, Any]]:
         """So many maps of a topic, whatever else comes."""
@@ -105,11 +112,34 @@ class Subscriber:
         return collected
 
     def waiting(self) -> list[tuple[str, list[dict[str, Any]]]]:
-        """What has come, up to an end that cannot be mistaken: nothing for 50 ms."""
-        messages = []
-        while self.socket.poll(50):
-            messages.append(self.message())
-        return messages
+        """What has come, up to an end that is published now; again and again, since a full queue drops it as well."""
+        assert self._say is not None
+        self._ends += 1
+        end = (END, [{"timestamp": 0.0, "seq": self._ends}])
+        messages: list[tuple[str, list[dict[str, Any]]]] = []
+        give_up_s = time.monotonic() + PATIENCE_S
+        while True:
+            assert time.monotonic() < give_up_s, "no end came"
+            self._say(*end)
+            while self.socket.poll(50):
+                message = self._next()
+                if message == end:
+                    return messages
+                if message[0] != END:
+                    messages.append(message)
+
+    def _next(self) -> tuple[str, list[dict[str, Any]]]:
+        assert self.socket.poll(int(PATIENCE_S * 1000)), "nothing came"
+        frames = self.socket.recv_multipart(zmq.NOBLOCK)
+        assert len(frames) == 2
+        maps = msgpack.unpackb(frames[1])
+        assert isinstance(maps, list)
+        assert maps
+        for fields in maps:
+            assert isinstance(fields, dict)
+            assert isinstance(fields["timestamp"], float)
+            assert isinstance(fields["seq"], int)
+        return frames[0].decode(), maps
 
 
 def ticks(count: int, first: int = 0) -> list[TickRecord]:

@@ -213,8 +213,9 @@ def test_close_sends_the_last_words_and_leaves_nothing_behind() -> None:
         wire.publisher.event(Event(EventCode.STOPPING, "stopping", 5, 0))
         wire.publisher.close()
         wire.publisher.close()
-        assert sorted(topic for topic, _ in subscriber.waiting()) == ["hapticd/event", "hapticd/position"]
         assert not wire.path.exists()
+        wire.restart()  # it says up to where to read
+        assert sorted(topic for topic, _ in subscriber.waiting()) == ["hapticd/event", "hapticd/position"]
 
 
 def test_a_stalled_subscriber_does_not_keep_the_daemon_from_stopping() -> None:
@@ -263,7 +264,7 @@ def test_only_this_computer_is_served_without_keys(host: str) -> None:
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.9.9.9", "[::1]", "localhost"])
 def test_loopback_addresses_are_served(host: str) -> None:
     if host == "[::1]" and not Path("/proc/net/if_inet6").exists():
-        host = "127.0.0.1"  # a kernel without IPv6 has no ::1 to serve
+        pytest.skip("this kernel has no IPv6, so no ::1 to serve")
     publisher = open_at(None, f"tcp://{host}:0")
     assert publisher.endpoints[0].startswith("tcp://")
     publisher.close()
