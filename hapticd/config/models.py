@@ -176,6 +176,9 @@ class TelemetryConfig(Table):
     )
     batch_ticks: int = Field(20, ge=1, le=1000, description="most ticks in one message; 20 ms at the longest")
     every_ticks: int = Field(1, ge=1, le=10000, description="publish one tick in this many; cycles and events always")
+    input_every_tick: bool = Field(
+        False, description="publish buttons, gripper and orientation with every tick, and not on change only"
+    )
     send_high_water: int = Field(
         1000, ge=10, le=100000, description="messages kept for a slow subscriber before it loses new ones"
     )

@@ -25,6 +25,7 @@ LIVE: Final = (
     "safety",
     "telemetry.batch_ticks",
     "telemetry.every_ticks",
+    "telemetry.input_every_tick",
     "faults",
     "service",
 )

@@ -70,7 +70,6 @@ class Publisher:
         info: what the device reports besides its position.
         epoch_offset_ns: `wire.measure_epoch_offset_ns`, measured once at start.
         ring: the keys that an endpoint for other computers takes; without them there can be none.
-        input_every_tick: publish `hapticd/input` at every tick and not on change only.
 
     Raises:
         InstanceError: an endpoint cannot be had; the message says which, why and what to do.
@@ -83,15 +82,12 @@ class Publisher:
         info: Inputs,
         epoch_offset_ns: int,
         ring: KeyRing | None = None,
-        *,
-        input_every_tick: bool = False,
     ) -> None:
         self.counts = PublisherCounts()
         self.endpoints: list[str] = []
         self._offset_ns = epoch_offset_ns
         self._inputs = info
         self._has_input = bool(info.buttons or info.has_gripper or info.has_orientation)
-        self._input_every_tick = input_every_tick
         self._last_input: tuple[object, ...] = ()
         self._input_message: list[Map] | None = None
         self._status: dict[str, Any] | None = None
@@ -132,6 +128,7 @@ class Publisher:
         """Take over batching and decimation from a reloaded file; endpoints stay as they were bound."""
         self._batch_ticks = config.batch_ticks
         self._every_ticks = config.every_ticks
+        self._input_every_tick = config.input_every_tick
 
     def admit(self, ring: KeyRing) -> None:
         """Take other keys over; whoever is no longer listed is disconnected."""

@@ -95,6 +95,7 @@ SUPERVISOR = {
     "safety.auto_arm": "[safety]\nauto_arm = true\n",  # of a device that is found again
     "telemetry.batch_ticks": "[telemetry]\nbatch_ticks = 5\n",
     "telemetry.every_ticks": "[telemetry]\nevery_ticks = 2\n",
+    "telemetry.input_every_tick": "[telemetry]\ninput_every_tick = true\n",
     "faults.keep": "[faults]\nkeep = 3\n",
     "service.reload_on_save": "[service]\nreload_on_save = true\n",
 }

@@ -170,8 +170,8 @@ def test_buttons_are_told_when_they_change_and_to_whoever_comes_later() -> None:
 
 def test_buttons_at_every_tick_when_asked() -> None:
     with Wire() as wire:
-        config = TelemetryConfig(ipc=False).model_copy(update={"tcp": "tcp://127.0.0.1:0"})
-        publisher = Publisher(config, None, Stylus(), 0, input_every_tick=True)
+        config = TelemetryConfig(ipc=False, input_every_tick=True).model_copy(update={"tcp": "tcp://127.0.0.1:0"})
+        publisher = Publisher(config, None, Stylus(), 0)
         subscriber = wire.socket(zmq.SUB, publisher.endpoints[0])
         subscriber.setsockopt(zmq.SUBSCRIBE, b"hapticd/input")
         wait_until(lambda: served(publisher) > 0, "a subscription")
