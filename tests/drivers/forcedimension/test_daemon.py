@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import subprocess
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hapticd.contracts.event import EventCode
-from tests.daemon.running import Subscriber, wait_until
+from tests.daemon.running import HAPTICD, Subscriber, wait_until
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, RESET, SOFTWARE, WATCHDOG, Bench
 from tests.drivers.forcedimension.lab import PRESS_N, Lab, rest_of
 
@@ -232,4 +233,19 @@ def test_a_calibration_that_moves_the_arm_ends_when_somebody_disarms_or_stops_th
         lab.daemon.process.terminate()
         assert lab.daemon.wait_exit() == 0
         pool.shutdown(wait=False, cancel_futures=True)
+    assert lab.look().get("mode") == RESET
+
+
+def test_ctrl_c_on_the_command_ends_a_calibration_while_the_arm_moves(lab: Lab) -> None:
+    assert lab.ask("disarm") == ""
+    wait_until(lambda: lab.look().get("mode") == BRAKE, "the ramp to end")
+    lab.look().set(hand_n=[0.0, 0.0, 0.0], calibrated=0, auto_init_us=600_000_000)
+    command = [HAPTICD, "calibrate", "--countdown", "0"]
+    environment = {**os.environ, "HAPTICD_RUNTIME_DIR": f"{lab.daemon.directory}/run"}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as calibrating:
+        wait_until(lambda: lab.look().get("moves") == 1, "the arm to move")
+        calibrating.send_signal(signal.SIGINT)
+        _, said = calibrating.communicate(timeout=60.0)
+    assert (calibrating.returncode, said.splitlines()) == (130, ["calibrating", "called off"])
+    wait_until(lambda: "calibrating" not in lab.ask("arm"), "the calibration to end")
     assert lab.look().get("mode") == RESET
