@@ -178,7 +178,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
     ended = cycle_ended(state, state.energy_j, inside, params.window, future)  # eq. 10
     if state.window_rises == 0 and (not ended or state.window_minimum_j == state.energy_j):
         state.candidate_motion_m2_per_s = state.motion_m2_per_s
-        state.candidate_stored_j = 0.5 * abs(tick.x_m * tick.contact_n)
+        state.candidate_stored_j = 0.5 * abs(tick.x_m * tick.spring_n)
     if ended:
         if state.count >= FELT_SAMPLES:
             _believe(state, params)

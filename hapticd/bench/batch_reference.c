@@ -223,7 +223,7 @@ static inline double law_step(law_state *s, const law_params *p, const law_tick 
     bool ended = cycle_ended(s, s->energy_j, inside, p->window, future);
     if (s->window_rises == 0 && (!ended || s->window_minimum_j == s->energy_j)) {
         s->candidate_motion_m2_per_s = s->motion_m2_per_s;
-        s->candidate_stored_j = 0.5 * fabs(t->x_m * t->contact_n);
+        s->candidate_stored_j = 0.5 * fabs(t->x_m * t->spring_n);
     }
     if (ended) {
         if (s->count >= FELT_SAMPLES) believe(s, p);
@@ -286,11 +286,12 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
             tick->velocity_m_per_s = velocity;
             if (x < 0.0) {
                 tick->in_contact = true;
-                tick->contact_n = -stiffness * x;
+                tick->spring_n = -stiffness * x;
             } else {
                 tick->in_contact = false;
-                tick->contact_n = 0.0;
+                tick->spring_n = 0.0;
             }
+            tick->contact_n = tick->spring_n;
             double force = law_step(state, law, tick);
             if (!tick->in_contact) force = 0.0;
             if (!(-MOST < force && force < MOST)) {

@@ -47,6 +47,7 @@ class LawTick:
         dt_s: time since the last sample [s].
         in_contact: whether x_m < 0.
         contact_n: the contact's own force now, spring and wall damping [N].
+        spring_n: the spring's part of `contact_n` [N].
         applied_n: force of this contact that was applied from the last sample to this one, F(n-1) [N].
         applied_contact_n: the part of `applied_n` that was the contact's own, without the law's damping [N].
         resolution_m: smallest step of the position that the device can report [m]; 0 when continuous.
@@ -60,6 +61,7 @@ class LawTick:
         "in_contact",
         "moved_m",
         "resolution_m",
+        "spring_n",
         "velocity_m_per_s",
         "x_m",
     )
@@ -71,6 +73,7 @@ class LawTick:
         self.dt_s = 0.0
         self.in_contact = False
         self.contact_n = 0.0
+        self.spring_n = 0.0
         self.applied_n = 0.0
         self.applied_contact_n = 0.0
         self.resolution_m = resolution_m

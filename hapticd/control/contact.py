@@ -155,6 +155,7 @@ class Contact:
         tick.dt_s = dt_s
         tick.in_contact = self.in_contact
         tick.contact_n = self._contact_n
+        tick.spring_n = self.wall.spring_n
         tick.applied_n = self.applied_n
         tick.applied_contact_n = self._applied_contact_n
 
@@ -192,9 +193,10 @@ class Contact:
         if x_m < 0.0:
             tick.in_contact = self.in_contact = True
             tick.contact_n = self._contact_n = wall.force(x_m, velocity_m_per_s)
+            tick.spring_n = wall.spring_n
         else:
             tick.in_contact = self.in_contact = False
-            tick.contact_n = self._contact_n = wall.spring_n = 0.0
+            tick.contact_n = self._contact_n = tick.spring_n = wall.spring_n = 0.0
 
     def act(self) -> None:
         """Ask the law for its force.

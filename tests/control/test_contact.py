@@ -43,15 +43,18 @@ def test_a_law_sees_its_wall_from_the_outside_whichever_side_is_free(free_side: 
     seen: list[tuple[float, ...]] = []
 
     def step(_state: Any, _params: Any, shown: Any) -> float:
-        seen.append((shown.x_m, shown.moved_m, shown.velocity_m_per_s, shown.contact_n, shown.dt_s, shown.resolution_m))
+        forces = shown.contact_n, shown.spring_n
+        seen.append((shown.x_m, shown.moved_m, shown.velocity_m_per_s, *forces, shown.dt_s, shown.resolution_m))
         force_n: float = shown.contact_n
         return force_n
 
     made = contact(step, free_side=free_side, damping_n_s_per_m=10.0)
     made.start(0.01 + outward * 0.001)
     tick(made, 0.01 - outward * 0.002, -outward * 0.3)
-    assert seen[0] == pytest.approx((-0.002, -0.003, -0.3, 2.0 + 3.0, PERIOD_S, 1e-5))
+    assert seen[0] == pytest.approx((-0.002, -0.003, -0.3, 2.0 + 3.0, 2.0, PERIOD_S, 1e-5))
     assert made.in_contact
+    tick(made, 0.01 + outward * 0.001, outward * 0.3)
+    assert seen[1] == pytest.approx((0.001, 0.003, 0.3, 0.0, 0.0, PERIOD_S, 1e-5))
 
 
 def test_a_law_sees_the_force_that_was_applied_and_which_part_of_it_was_the_walls_own() -> None:
@@ -124,18 +127,19 @@ def test_a_law_publishes_damping_and_mass_if_it_has_them() -> None:
 def test_a_new_law_is_shown_the_contact_as_it_is_not_as_the_old_one_left_it() -> None:
     def step(_state: Any, _params: Any, shown: Any) -> float:
         force_n: float = shown.contact_n
-        shown.x_m = shown.applied_n = shown.resolution_m = math.nan
+        shown.x_m = shown.applied_n = shown.spring_n = shown.resolution_m = math.nan
         return force_n
 
-    made = contact(step)
+    made = contact(step, damping_n_s_per_m=10.0)
     tick(made, 0.008, 0.1)
     module = law(own)
     made.take_law(RunningLaw(module, module.Params()), 0.1, PERIOD_S)
     shown = made.tick
     assert (shown.x_m, shown.applied_n, shown.applied_contact_n, shown.resolution_m) == pytest.approx(
-        (-0.002, 2, 2, 1e-5)
+        (-0.002, 1, 1, 1e-5)
     )
-    assert (shown.velocity_m_per_s, shown.dt_s, shown.in_contact, shown.contact_n) == (0.1, PERIOD_S, True, 2.0)
+    assert (shown.velocity_m_per_s, shown.dt_s, shown.in_contact) == (0.1, PERIOD_S, True)
+    assert (shown.contact_n, shown.spring_n) == pytest.approx((1.0, 2.0))
 
 
 def test_a_change_of_the_wall_comes_at_its_tick() -> None:

@@ -116,9 +116,10 @@ def drive(step: Any, state: Any, params: Any, tick: Any, plant: Any, ticks: int)
         tick.moved_m = measured_m - plant.measured_m
         tick.velocity_m_per_s = tick.moved_m / tick.dt_s
         tick.in_contact = measured_m < 0.0
-        tick.contact_n = 0.0
+        tick.spring_n = tick.contact_n = 0.0
         if measured_m < 0.0:
-            tick.contact_n = -plant.stiffness_n_per_m * measured_m - plant.damping_n_s_per_m * tick.velocity_m_per_s
+            tick.spring_n = -plant.stiffness_n_per_m * measured_m
+            tick.contact_n = tick.spring_n - plant.damping_n_s_per_m * tick.velocity_m_per_s
         force_n = step(state, params, tick)
         if measured_m >= 0.0:
             force_n = 0.0

@@ -35,7 +35,7 @@ LAWS = (none, energy_cycle, tdpa)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 NUMBER = st.one_of(st.floats(-20.0, 20.0), st.floats(-1e-3, 1e-3), st.sampled_from([0.0, 1e-3, 5e-324, -1e308]), FINITE)
 LONGEST = {"x_m": 1e8, "moved_m": 1e8, "velocity_m_per_s": 1e6, "contact_n": 1e18, "applied_n": 1e18}
-LONGEST["applied_contact_n"] = LONGEST["contact_n"]
+LONGEST["applied_contact_n"] = LONGEST["spring_n"] = LONGEST["contact_n"]
 """What `LawTick` promises of its numbers."""
 each_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__.rpartition(".")[2])
 

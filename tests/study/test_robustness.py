@@ -17,8 +17,9 @@ from hapticd.config.loading import parse
 from hapticd.simulation.batch import Batch
 from hapticd.study.laws import Reading
 from hapticd.study.offline import OfflineRun
+from hapticd.study.paper.scenarios import TDPA_AS_PUBLISHED
 from hapticd.study.robustness.devices import DURATION_S, Device, draw
-from hapticd.study.robustness.readings import PAPER, every_reading, params_on
+from hapticd.study.robustness.readings import PAPER, every_reading, params_on, short
 from hapticd.study.robustness.report import reason, report
 from hapticd.study.robustness.sweep import COLUMNS, Plan, pressed
 from hapticd.study.verdict import Criterion, Outcome
@@ -135,6 +136,11 @@ def test_every_choice_of_the_papers_law_is_a_reading_that_its_parameters_take() 
     known = next(reading for reading in readings if reading.label == f"{PAPER}:cap=known-mass")
     assert params_on(known, DEVICES[3]).model_dump()["mass_kg"] == DEVICES[3].options.mass_kg
     assert params_on(DEFAULT, DEVICES[3]) == registry.law(PAPER).Params()
+
+
+def test_tdpa_as_published_is_that_of_the_papers_study() -> None:
+    found = [dict(reading.values) for reading in every_reading() if short(reading.label) == ("tdpa", "as published")]
+    assert found == [TDPA_AS_PUBLISHED]
 
 
 def test_the_reason_says_what_happened_and_what_was_asked_for() -> None:

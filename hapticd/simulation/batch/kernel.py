@@ -158,6 +158,7 @@ def run(
             else:
                 tick.in_contact = False
                 tick.contact_n = 0.0
+            tick.spring_n = spring_n
 
             # law
             force_n = law_step(law_state, law_params, tick)

@@ -126,8 +126,9 @@ PLATES = (
     Plate(
         "readings",
         "What the text leaves open",
-        "Rows: the law as shipped, each choice changed alone; then energy, sum, rule and cap in every combination, "
-        "without what we have added to the print (delay identified, small cycles bounded). "
+        "Rows: the law as shipped, each choice changed alone; then energy, sum, rule and cap in every combination, and "
+        "the pairings and the window of the print, without what we have added to the print (delay identified, small "
+        "cycles bounded). "
         "Columns: the paper's four simulations (0.5 kg undamped), and a device of 0.25 kg, 4 N s/m, 10 um, 12 N at six "
         "walls. Right: how many of 28 settle.",
         "The pairing of force and motion must see the hold; a damping that may fall winds up; the work of the damping "

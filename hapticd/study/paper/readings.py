@@ -148,14 +148,23 @@ def single_choices() -> list[Reading]:
 
 
 def combined_choices() -> list[Reading]:
-    """Energy, sum, rule and cap: the four choices that decide most, in every combination, without our additions."""
+    """Energy, sum, rule and cap: the four choices that decide most, in every combination, without our additions.
+
+    Then the pairings and the window of the print, as bare.
+    """
     caps: dict[str, dict[str, Any]] = {"none": {"cap": "none"}, "200": {"cap": "fixed", "cap_damping_n_s_per_m": 200.0}}
-    return [
+    every = [
         Reading(f"{work}, {total}, {rule}, cap {cap}", {**PRINTED, "work": work, "sum": total, "rule": rule, **params})
         for work in ("spring", "total")
         for total in ("cycle", "start")
         for rule in ("non-decreasing", "non-negative", "signed")
         for cap, params in caps.items()
+    ]
+    bare = {**PRINTED, "cap": "none"}
+    return [
+        *every,
+        *(Reading(f"pairing = {name}, cap none", {**bare, "pairing": name}) for name in ("new-force", "power")),
+        Reading("eq. 10 as printed, cap none", {**bare, "plateaus": "literal", "contact_loss": "ignored"}),
     ]
 
 

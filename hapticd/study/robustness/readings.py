@@ -11,15 +11,15 @@ from hapticd.contracts.errors import PluginError
 from hapticd.contracts.law import LawParams
 from hapticd.simulation.compile import compiled_step
 from hapticd.study.laws import Reading
+from hapticd.study.paper.scenarios import TDPA_AS_PUBLISHED
 from hapticd.study.robustness.devices import Device
 
 PAPER = "energy-cycle"
 
-_UNBOUNDED = {"damping_cap_n_s_per_m": 0.0, "min_speed_m_per_s": 0.0}
 _BARE = {"cap": "none", "force_delay": "none", "small_leaks": 0.0}
 # What one change from the default does not show.
 _COMBINED: dict[str, tuple[dict[str, Any], ...]] = {
-    "tdpa": (_UNBOUNDED, {**_UNBOUNDED, "observer": "printed", "reset": "never"}),
+    "tdpa": (TDPA_AS_PUBLISHED, {**TDPA_AS_PUBLISHED, "observer": "printed"}),
     PAPER: (
         {"window": 1},
         {"small_leaks": 0.0},
@@ -32,7 +32,7 @@ _COMBINED: dict[str, tuple[dict[str, Any], ...]] = {
 
 
 SHORT = {
-    "unbounded": "damping_cap_n_s_per_m=0, min_speed_m_per_s=0",
+    "as published": "damping_cap_n_s_per_m=0, min_speed_m_per_s=0, reset=never",
     "bare": "cap=none, force_delay=none, small_leaks=0",
 }
 """Names for parameters that often stand together."""
