@@ -24,17 +24,18 @@ DAMPER_PEAK = (0.6862915010152397, 0.1444693492260521, 0.0624304893523135, 0.034
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """What a limit depends on, hand included.
+    """What a limit depends on.
 
     Attributes:
-        mass_kg: mass that moves [kg].
-        viscous_n_s_per_m: damping of device and hand, b [N s/m].
+        mass_kg: mass that moves, hand included [kg].
+        viscous_n_s_per_m: damping of the device itself, b: all that a limit for any operator may count on [N s/m].
         period_s: T [s].
         wall_damping_n_s_per_m: B [N s/m].
         delay_samples: d.
         coulomb_n: Coulomb friction [N].
         resolution_m: step of the position sensor [m].
         hand_n_per_m: spring of the hand [N/m].
+        hand_n_s_per_m: damping of the hand [N s/m].
     """
 
     mass_kg: float
@@ -45,6 +46,12 @@ class Loop:
     coulomb_n: float = 0.0
     resolution_m: float = 0.0
     hand_n_per_m: float = 0.0
+    hand_n_s_per_m: float = 0.0
+
+    @property
+    def damping_n_s_per_m(self) -> float:
+        """Damping of device and hand, which the loop of this one hand has [N s/m]."""
+        return self.viscous_n_s_per_m + self.hand_n_s_per_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +76,8 @@ def stable_limit(loop: Loop) -> float:
     """
     if loop.hand_n_per_m == 0.0:
         if loop.wall_damping_n_s_per_m == 0.0 and loop.delay_samples in (0, 1):
-            return spring_limit(loop.mass_kg, loop.viscous_n_s_per_m, loop.period_s, loop.delay_samples)
-        if loop.viscous_n_s_per_m == 0.0 and loop.delay_samples == 0 and loop.wall_damping_n_s_per_m > 0.0:
+            return spring_limit(loop.mass_kg, loop.damping_n_s_per_m, loop.period_s, loop.delay_samples)
+        if loop.damping_n_s_per_m == 0.0 and loop.delay_samples == 0 and loop.wall_damping_n_s_per_m > 0.0:
             return damper_limit(loop.mass_kg, loop.wall_damping_n_s_per_m, loop.period_s)
     return linear_limit(loop)
 
@@ -176,7 +183,7 @@ def _plant(mass_kg: float, viscous_n_s_per_m: float, period_s: float) -> tuple[f
 def _open_loop(loop: Loop) -> tuple[tuple[float, float], tuple[float, float]]:
     """From force to position, (c1 z + c0) / (z^2 + d1 z + d0): (c1, c0) and (d1, d0)."""
     stiffness = loop.hand_n_per_m / loop.mass_kg
-    slope, swing, area = flow(loop.viscous_n_s_per_m / loop.mass_kg, stiffness, loop.period_s)
+    slope, swing, area = flow(loop.damping_n_s_per_m / loop.mass_kg, stiffness, loop.period_s)
     keeps = 1.0 - stiffness * area
     c1 = area / loop.mass_kg
     return (c1, swing * swing / loop.mass_kg - slope * c1), (

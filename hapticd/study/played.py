@@ -15,7 +15,7 @@ from hapticd.contracts.errors import DriverError
 from hapticd.control.rehearsal import Rehearsal
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
-from hapticd.study.verdict import Criterion, coulomb_n, pressing_n
+from hapticd.study.verdict import Balance, Criterion, Outcome, balance
 
 MakeDevice = Callable[[SimulationOptions, float], SimulatedDevice]
 
@@ -30,9 +30,7 @@ class Played:
     Attributes:
         options: the device that was run.
         period_s: time between ticks [s].
-        target_m: where hand and springs balance on the first wall's normal, < 0 inside; NaN where they do not [m].
-        place_m: how far from it a device may rest [m].
-        still_m: largest span that is still [m].
+        balance: where hand and springs balance.
         x_m: true position [m].
         v_m_per_s: true velocity [m/s].
         measured_m: position that the loop saw [m].
@@ -44,9 +42,7 @@ class Played:
 
     options: SimulationOptions
     period_s: float
-    target_m: float
-    place_m: float
-    still_m: float
+    balance: Balance
     x_m: array[float]
     v_m_per_s: array[float]
     measured_m: array[float]
@@ -76,19 +72,18 @@ class Played:
         """What became of it, in the words of every study; a hand that never rests leaves only whether it ran."""
         if self.fault is not None:
             return "diverged" if "diverged" in self.fault else "stopped"
-        if math.isnan(self.target_m):
+        if math.isnan(self.balance.x_m):
             return "runs"
-        if self.peak_to_peak_m > self.still_m:
-            return "keeps moving"
-        return "settled" if abs(self.mean_m - self.target_m) <= self.place_m else "still, but out of place"
+        return Criterion().outcome(self.options, self.balance, self.peak_to_peak_m, self.mean_m).words
 
     @cached_property
     def settled_s(self) -> float:
         """From when on it stayed near the place where it rests; NaN when it does not rest [s]."""
-        if self.verdict not in ("settled", "still, but out of place"):
+        if self.verdict not in (Outcome.SETTLED.words, Outcome.ELSEWHERE.words):
             return math.nan
         x = np.asarray(self.x_m)
-        band = max(SETTLING_BAND * abs(float(x[0]) - self.mean_m), SETTLING_BAND * abs(self.mean_m), self.still_m)
+        still_m = Criterion().still_limit_m(self.options)
+        band = max(SETTLING_BAND * abs(float(x[0]) - self.mean_m), SETTLING_BAND * abs(self.mean_m), still_m)
         outside = np.flatnonzero(np.abs(x - self.mean_m) > band)
         return float((outside[-1] + 1) if len(outside) else 0) * self.period_s
 
@@ -157,15 +152,10 @@ def play(
         inside.append(first.in_contact if first else 0)
     if not x:
         raise DriverError(rehearsal.fault or "the device gave no sample")
-    device, criterion = model.options, Criterion()
-    target_m, springs_n_per_m = _balance(loaded, device)
-    friction_m = coulomb_n(device) / springs_n_per_m if springs_n_per_m > 0.0 else 0.0
     return Played(
-        options=device,
+        options=model.options,
         period_s=rehearsal.period_s,
-        target_m=target_m,
-        place_m=max(criterion.place_share * abs(target_m), criterion.place_counts * device.resolution_m) + friction_m,
-        still_m=criterion.still_limit_m(device),
+        balance=balance(model.options, loaded.config.scene.walls),
         x_m=x,
         v_m_per_s=v,
         measured_m=seen,
@@ -174,37 +164,6 @@ def play(
         inside=inside,
         fault=rehearsal.fault,
     )
-
-
-def _balance(loaded: LoadedConfig, options: SimulationOptions) -> tuple[float, float]:
-    """Where a resting hand and all springs balance at the end, and the stiffness there [m], [N/m].
-
-    Every wall that is parallel to the first one and faces the same way adds its spring where it is deeper than its
-    plane; the balance is found wall by wall, from the outermost one on.
-    """
-    force_n = pressing_n(options)
-    walls = loaded.config.scene.walls
-    hand = options.hand.stiffness_n_per_m
-    for change in options.changes:
-        hand = hand if change.hand_stiffness_n_per_m is None else change.hand_stiffness_n_per_m
-    if not force_n > 0.0 or not walls or any(wall.free_side != walls[0].free_side for wall in walls):
-        return math.nan, 0.0
-    outward = 1.0 if walls[0].free_side == "positive" else -1.0
-    planes = []
-    for wall in walls:
-        stiffness = wall.stiffness_n_per_m
-        for later in wall.changes:
-            stiffness = stiffness if later.stiffness_n_per_m is None else later.stiffness_n_per_m
-        planes.append((outward * (wall.position_m - walls[0].position_m), stiffness))
-    total, moment = hand, 0.0
-    x_m = math.nan
-    for plane_m, stiffness in sorted(planes, reverse=True):
-        if total > 0.0 and (moment - force_n) / total > plane_m:
-            break
-        total += stiffness
-        moment += stiffness * plane_m
-        x_m = (moment - force_n) / total if total > 0.0 else math.nan
-    return x_m, total
 
 
 def _largest(values: array[float], exact: array[float]) -> float:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import BatchResult, Point
 from hapticd.simulation.options import ConstantForce, RampForce, SimulationOptions, StepForce
 
@@ -30,6 +31,19 @@ class Outcome(IntEnum):
     def words(self) -> str:
         """For people."""
         return ("settled", "still, but out of place", "keeps moving", "diverged")[self]
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """Where hand force and springs balance at the end.
+
+    Attributes:
+        x_m: on the first wall's normal, < 0 inside; NaN where they do not [m].
+        springs_n_per_m: stiffness there, walls and hand [N/m].
+    """
+
+    x_m: float
+    springs_n_per_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +81,22 @@ class Criterion:
         return max(self.still_m, self.still_counts * device.resolution_m)
 
     def place_limit_m(self, point: Point) -> float:
-        """Largest distance from the balance that is in place [m]: Coulomb friction may hold the device beside it."""
-        stiffness = springs_n_per_m(point)
-        friction_m = coulomb_n(point.device) / stiffness if stiffness > 0.0 else 0.0
-        aim_m = abs(balance_m(point))
-        return max(self.place_share * aim_m, self.place_counts * point.device.resolution_m) + friction_m
+        """Largest distance from the balance that is in place [m]."""
+        return self._place_limit_m(point.device, balance(point.device, [point.wall]))
+
+    def outcome(self, device: SimulationOptions, at: Balance, span_m: float, mean_m: float) -> Outcome:
+        """What became of a press that did not diverge.
+
+        Args:
+            device: the device.
+            at: where it should rest.
+            span_m: of the true position over the last `window_s` [m].
+            mean_m: mean of that position [m].
+        """
+        if not span_m <= self.still_limit_m(device):
+            return Outcome.MOVING
+        placed = abs(mean_m - at.x_m) <= self._place_limit_m(device, at)
+        return Outcome.SETTLED if placed else Outcome.ELSEWHERE
 
     def judge(self, points: Sequence[Point], result: BatchResult) -> np.ndarray[Any, Any]:
         """The `Outcome` of each point.
@@ -80,13 +105,21 @@ class Criterion:
             points: the loops; each must have a balance.
             result: what became of them, with a window of `window_s`.
         """
-        still_limit_m = np.array([self.still_limit_m(point.device) for point in points])
-        place_limit_m = np.array([self.place_limit_m(point) for point in points])
-        still = result.peak_to_peak_m <= still_limit_m
-        placed = np.abs(misplaced_m(points, result)) <= place_limit_m
-        return np.select(
-            [~result.finite, ~still, ~placed], [Outcome.DIVERGED, Outcome.MOVING, Outcome.ELSEWHERE], Outcome.SETTLED
+        ended = zip(points, result.finite, result.peak_to_peak_m, -result.mean_depth_m, strict=True)
+        return np.array(
+            [
+                self.outcome(point.device, balance(point.device, [point.wall]), span_m, mean_m)
+                if finite
+                else Outcome.DIVERGED
+                for point, finite, span_m, mean_m in ended
+            ],
+            dtype=int,
         )
+
+    def _place_limit_m(self, device: SimulationOptions, at: Balance) -> float:
+        # Coulomb friction may hold the device beside the balance.
+        friction_m = coulomb_n(device) / at.springs_n_per_m if at.springs_n_per_m > 0.0 else 0.0
+        return max(self.place_share * abs(at.x_m), self.place_counts * device.resolution_m) + friction_m
 
 
 def misplaced_m(points: Sequence[Point], result: BatchResult) -> np.ndarray[Any, Any]:
@@ -97,26 +130,42 @@ def misplaced_m(points: Sequence[Point], result: BatchResult) -> np.ndarray[Any,
 
 def balance_m(point: Point) -> float:
     """Where hand force and springs balance at the end, < 0 in the wall [m]; NaN where they do not."""
-    force_n = pressing_n(point.device)
-    stiffness = springs_n_per_m(point)
-    return -force_n / stiffness if force_n > 0.0 and stiffness > 0.0 else math.nan
+    return balance(point.device, [point.wall]).x_m
+
+
+def balance(device: SimulationOptions, walls: Sequence[WallConfig]) -> Balance:
+    """Where a hand that comes to rest and all springs balance at the end.
+
+    Every wall that is parallel to the first one and faces the same way adds its spring where it is deeper than its
+    plane; the balance is found wall by wall, from the outermost one on.
+    """
+    force_n = pressing_n(device)
+    if not force_n > 0.0 or not walls or any(wall.free_side != walls[0].free_side for wall in walls):
+        return Balance(math.nan, 0.0)
+    outward = 1.0 if walls[0].free_side == "positive" else -1.0
+    planes = []
+    for wall in walls:
+        stiffness = wall.stiffness_n_per_m
+        for later in wall.changes:
+            stiffness = stiffness if later.stiffness_n_per_m is None else later.stiffness_n_per_m
+        planes.append((outward * (wall.position_m - walls[0].position_m), stiffness))
+    total, moment = device.hand.stiffness_n_per_m, 0.0
+    for change in device.changes:
+        total = total if change.hand_stiffness_n_per_m is None else change.hand_stiffness_n_per_m
+    x_m = math.nan
+    for plane_m, stiffness in sorted(planes, reverse=True):
+        if total > 0.0 and (moment - force_n) / total > plane_m:
+            break
+        total += stiffness
+        moment += stiffness * plane_m
+        x_m = (moment - force_n) / total if total > 0.0 else math.nan
+    return Balance(x_m, total)
 
 
 def pressing_n(device: SimulationOptions) -> float:
     """The force with which the hand presses at the end, > 0 into the wall [N]; NaN when it never comes to an end."""
     force = device.hand.force
     return -force.newton if isinstance(force, ConstantForce | StepForce | RampForce) else math.nan
-
-
-def springs_n_per_m(point: Point) -> float:
-    """Stiffness of wall and hand at the end [N/m]."""
-    wall = point.wall.stiffness_n_per_m
-    for change in point.wall.changes:
-        wall = wall if change.stiffness_n_per_m is None else change.stiffness_n_per_m
-    hand = point.device.hand.stiffness_n_per_m
-    for device_change in point.device.changes:
-        hand = hand if device_change.hand_stiffness_n_per_m is None else device_change.hand_stiffness_n_per_m
-    return wall + hand
 
 
 def coulomb_n(device: SimulationOptions) -> float:

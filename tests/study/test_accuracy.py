@@ -29,6 +29,7 @@ from hapticd.study.accuracy.model import Model, measure_model
 from hapticd.study.accuracy.telemetry import measure_batches
 from hapticd.study.accuracy.traps import traps
 from hapticd.study.played import play
+from hapticd.study.verdict import Criterion
 from tests.simulation import exact
 
 T = 1e-3
@@ -334,6 +335,7 @@ def test_the_command_writes_everything_and_prints_a_screen(tmp_path: Path, capsy
     assert float(rows["explicit-euler x1"]["leak_share"]) == pytest.approx(2.0, rel=0.02)
     told = json.loads((tmp_path / "out" / "accuracy.json").read_text())
     assert {"model", "rates", "velocity", "cycle_windows", "telemetry_batches", "traps", "continuous_wall"} <= set(told)
+    assert told["criterion"] == Criterion().declared()
     assert (tmp_path / "out" / "accuracy.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -81,6 +81,7 @@ LOOPS: dict[str, dict[str, Any]] = {
     "damped wall": {"wall": 20.0},
     "damped wall, one sample late": {"wall": 20.0, "delay": 1},
     "active wall": {"wall": -1.0},
+    "braked by a hand": {"hand": {"damping_n_s_per_m": 5.0}},
     "held by a hand": {"wall": 8.0, "hand": {"mass_kg": 0.1, "damping_n_s_per_m": 2.0, "stiffness_n_per_m": 400.0}},
 }
 
@@ -91,11 +92,12 @@ def test_the_simulated_loop_rings_down_below_the_limit_and_up_above_it(name: str
     hand = keys.get("hand", {})
     loop = Loop(
         0.25 + hand.get("mass_kg", 0.0),
-        2.0 + hand.get("damping_n_s_per_m", 0.0),
+        2.0,
         T,
         wall_damping_n_s_per_m=keys.get("wall", 0.0),
         delay_samples=keys.get("delay", 0),
         hand_n_per_m=hand.get("stiffness_n_per_m", 0.0),
+        hand_n_s_per_m=hand.get("damping_n_s_per_m", 0.0),
     )
     limit = boundaries.stable_limit(loop)
     early_m, late_m = (span_m(duration_s, 0.95 * limit, **keys) for duration_s in (1.0, 3.0))
@@ -132,6 +134,13 @@ def test_passivity_asks_for_more_than_stability() -> None:
     assert boundaries.passive_limit(Loop(0.25, 4.0, T)) == pytest.approx(8000.0)
     assert boundaries.passive_limit(Loop(0.25, 4.0, T, delay_samples=1)) == pytest.approx(8000.0 / 3.0)
     assert math.isnan(boundaries.passive_limit(Loop(0.25, 4.0, T, 1.0, 1)))
+
+
+def test_what_is_passive_for_any_operator_does_not_count_on_the_hand_of_one() -> None:
+    for limit in (boundaries.passive_limit, boundaries.quantised_passive_limit):
+        alone, held = (Loop(0.25, 4.0, T, coulomb_n=0.1, resolution_m=1e-5, hand_n_s_per_m=hand) for hand in (0.0, 5.0))
+        assert limit(held) == limit(alone) == pytest.approx(8000.0)
+        assert boundaries.stable_limit(held) > 2.0 * boundaries.stable_limit(alone)
 
 
 def test_quantisation_is_passive_from_the_friction_on_that_abbott_and_okamura_give() -> None:

@@ -30,6 +30,7 @@ from hapticd.study.extremes.place import DELAYS, LAWS, RATES_HZ, Place, draw, pl
 from hapticd.study.extremes.refusals import is_due
 from hapticd.study.extremes.sweep import COLUMNS, Plan, judge, rows_of
 from hapticd.study.extremes.verdict import MARGIN, Verdict, verdict_of
+from hapticd.study.verdict import Criterion
 
 REPEATABLE = settings(derandomize=True, deadline=None)
 
@@ -341,6 +342,36 @@ def test_a_law_may_shake_a_device_beyond_the_ceiling_of_a_sampled_damper_and_not
     assert law_breaks(active, 0.1) is Break.FAULT
 
 
+def test_a_law_is_judged_by_the_damping_that_it_brought_and_not_by_its_cap() -> None:
+    """2 m/T is 20 N s/m here and the cap 50: only the bounce that the law really brakes so hard counts."""
+    light = Place(mass_kg=0.01, stiffness_n_per_m=100.0, viscous_n_s_per_m=0.5, law="tdpa")
+    for moved, least, most, what in (
+        (light, 0.0, 0.0, Break.NONE),
+        (replace(light, initial_velocity_m_per_s=-1.0), 0.1, 1.0, Break.NONE),
+        (replace(light, initial_velocity_m_per_s=-1.0, hand_n=-0.1), 50.0, 50.0, Break.CEILING),
+    ):
+        row = row_of(moved)
+        assert row["stepped"] == Verdict.STABLE
+        assert least <= row["damping_n_s_per_m"] <= most
+        assert row["law_break"] == what
+
+
+def test_damping_that_a_law_learns_when_the_device_leaves_has_not_acted() -> None:
+    """One bounce is one energy cycle, and its damping would brake the next one, which never comes."""
+    place = Place(
+        mass_kg=0.5,
+        stiffness_n_per_m=3000.0,
+        viscous_n_s_per_m=2.0,
+        initial_position_m=1e-3,
+        initial_velocity_m_per_s=-0.2,
+        law="energy-cycle",
+    )
+    law = registry.law("energy-cycle")
+    point = Point(place.options(), place.wall(), law.Params(), place.period_s)
+    assert Batch(law, [point], 1.0).run_interpreted().damping_n_s_per_m[0] > 1.0
+    assert row_of(place)["damping_n_s_per_m"] == 0.0
+
+
 # --- refusals --------------------------------------------------------------------------------------------------------
 
 
@@ -381,6 +412,7 @@ def test_the_command_writes_report_picture_and_json_and_replays_a_place(
     assert len(shown.splitlines()) <= 24
     told = json.loads((tmp_path / "extremes.json").read_text())
     assert told["holds"] is True
+    assert told["criterion"] == Criterion().declared()
     assert told["disagreements"] == []
     counts = told["counts"]
     assert counts["stable"] + counts["marginal"] + counts["unstable"] + counts["refused"] == 440

@@ -21,6 +21,7 @@ from hapticd.study.scene.answers import answers
 from hapticd.study.scene.study import Scene, study
 from hapticd.study.scene.terms import reduced, terms_of
 from hapticd.study.scene.ticks import SCENES, bare, scene_ticks, tick_operations
+from hapticd.study.verdict import Criterion
 
 SECONDS = 1.0
 SHIPPED = sorted(
@@ -209,6 +210,7 @@ def test_json_says_what_the_table_says_and_more(tmp_path: Path, capsys: pytest.C
     left = {term.name for term in terms_of(parse(told["minimal"]["config"], "told"))}
     assert left == {term["name"] for term in told["terms"]} - set(told["minimal"]["without"])
     assert {one["name"] for one in told["ticks"]} == set(SCENES)
+    assert told["criterion"] == Criterion().declared()
 
 
 @pytest.mark.parametrize(

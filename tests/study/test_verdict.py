@@ -8,10 +8,12 @@ from typing import Any
 import pytest
 
 from hapticd import registry
+from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.options import SimulationOptions
-from hapticd.study.verdict import Criterion, Outcome, balance_m, misplaced_m
+from hapticd.study.played import play
+from hapticd.study.verdict import Criterion, Outcome, balance, balance_m, misplaced_m
 
 CRITERION = Criterion()
 
@@ -63,6 +65,51 @@ def test_friction_may_hold_a_device_beside_the_balance() -> None:
     off_m = abs(misplaced_m([point], result)[0])
     assert 0.1 * 2e-3 < off_m < 1e-3
     assert outcome(1000.0, 2.0, **stuck) is Outcome.SETTLED
+
+
+WALLS = """
+[[scene.walls]]
+position_m = 0.05
+stiffness_n_per_m = 1000.0
+[[scene.walls]]
+position_m = 0.049
+stiffness_n_per_m = 3000.0
+"""
+
+
+def pressed(newton: float, extra: str = "", walls: str = WALLS) -> LoadedConfig:
+    hand = f'hand.force = {{ profile = "constant", newton = -{newton} }}'
+    return parse(f'[controller]\nlaw = "none"\n[device.options]\n{hand}\n{extra}\n{walls}', "lab.toml")
+
+
+def test_a_second_wall_carries_its_part_only_where_it_is_reached() -> None:
+    """1 kN/m, and 1 mm deeper 3 kN/m more: 0.5 N ends before the second wall, 3 N half a millimetre inside it."""
+    for newton, x_m, springs in ((0.5, -0.5e-3, 1000.0), (3.0, -1.5e-3, 4000.0)):
+        loaded = pressed(newton)
+        assert isinstance(loaded.options, SimulationOptions)
+        found = balance(loaded.options, loaded.config.scene.walls)
+        assert found.x_m == pytest.approx(x_m)
+        assert found.springs_n_per_m == springs
+        assert play(loaded, 2.0).mean_m == pytest.approx(x_m, abs=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "extra", "words"),
+    [
+        (5000.0, "", "settled"),
+        (12000.0, "", "keeps moving"),
+        (1000.0, "coulomb_n = 1.0\ninitial_position_m = -3.9e-3\nviscous_n_s_per_m = 40.0", "settled"),
+    ],
+)
+def test_a_run_of_the_loop_and_a_point_of_a_batch_are_judged_alike(stiffness: float, extra: str, words: str) -> None:
+    """The last is held by friction a third of its depth beside the balance."""
+    loaded = pressed(3.0, extra, f"[[scene.walls]]\nstiffness_n_per_m = {stiffness}")
+    assert isinstance(loaded.options, SimulationOptions)
+    assert play(loaded, 4.0).verdict == words
+    law = registry.law("none")
+    point = Point(loaded.options, loaded.config.scene.walls[0], law.Params(), max_force_n=12.0)
+    result = Batch(law, [point], 4.0, CRITERION.window_s, ledger=False).run_interpreted()
+    assert Outcome(CRITERION.judge([point], result)[0]).words == words
 
 
 def test_stillness_is_never_finer_than_the_sensor() -> None:

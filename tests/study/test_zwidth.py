@@ -17,11 +17,14 @@ import pytest
 
 from hapticd.cli import main
 from hapticd.config.loading import parse
+from hapticd.study.boundaries import passive_limit, stable_limit
 from hapticd.study.grid import job
 from hapticd.study.grid.journal import Row
+from hapticd.study.laws import parse_laws
+from hapticd.study.verdict import Criterion
 from hapticd.study.zwidth import sweep
 from hapticd.study.zwidth.plane import QUANTITIES, parse_axis
-from hapticd.study.zwidth.scenario import scenario_of
+from hapticd.study.zwidth.scenario import scenario_of, with_values
 
 HAPTICD = str(Path(sys.executable).with_name("hapticd"))
 FILES = ("zwidth.csv", "zwidth.json", "zwidth.png")
@@ -119,6 +122,16 @@ def test_with_several_starts_every_one_of_them_has_to_settle(tmp_path: Path) -> 
     assert all((row["outcome"] == "settled") == (row["settled_starts"] == "5") for row in rows)
 
 
+@pytest.mark.parametrize(("starts", "heights_mm"), [(1, [4.0]), (2, [4.0, 14.0]), (5, [4.0, 6.5, 9.0, 11.5, 14.0])])
+def test_starts_reach_from_the_press_s_own_to_ten_millimetres_above(starts: int, heights_mm: list[float]) -> None:
+    text = (ROOT / "config/wall-12-none.toml").read_text()
+    text = with_values(text, "own.toml", ["device.options.initial_position_m=0.004"], {})
+    axes = (parse_axis("stiffness=5e3..6e3", 2, "--x"), parse_axis("mass=0.2..0.3", 2, "--y"))
+    plan = sweep.Plan(text, "own.toml", parse_laws("none", {}), *axes, "grid", 1.0, starts, Criterion())
+    points = sweep._Press(plan.job().spec, 0, None)._points(5e3, 0.2)
+    assert [1e3 * point.device.initial_position_m for point in points] == pytest.approx(heights_mm)
+
+
 def test_the_table_has_a_line_a_cell_with_units_in_its_columns(tmp_path: Path) -> None:
     mapped(tmp_path, *SMALL, "--x", "stiffness=500..8e3", "--y", "delay=0..2", "--set", "mass=0.1")
     with (tmp_path / "zwidth.csv").open() as file:
@@ -145,6 +158,13 @@ def test_every_parameter_can_be_varied(name: str) -> None:
 
 
 ROOT = Path(__file__).parents[2]
+
+
+def test_a_hand_that_brakes_moves_the_limit_of_its_own_loop_and_not_that_for_any_operator() -> None:
+    alone = scenario_of(parse((ROOT / "config/wall-12-none.toml").read_text(), "wall-12-none.toml"))
+    held = QUANTITIES["hand-damping"].put(alone, 5.0)
+    assert passive_limit(held.loop()) == passive_limit(alone.loop()) == pytest.approx(8800.0)
+    assert stable_limit(held.loop()) > 2.0 * stable_limit(alone.loop())
 
 
 def test_a_law_gets_the_parameters_that_it_is_given(tmp_path: Path) -> None:
@@ -242,6 +262,10 @@ REFUSED: dict[str, tuple[Sequence[str], str]] = {
     "a wall that changes what is varied": (
         ["--set", "scene.walls[0].changes=[{at_s=1.0, stiffness_n_per_m=9e3}]"],
         "over time; take that out",
+    ),
+    "a start inside the wall": (
+        ["--set", "device.options.initial_position_m=-0.002"],
+        "device.options.initial_position_m = -0.002: must be 0 or more",
     ),
     "no file": (["--config", "nowhere.toml"], "nowhere.toml: no such file"),
     "a folder that is a file": (["--output", __file__], "cannot be written"),

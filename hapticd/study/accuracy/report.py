@@ -17,6 +17,7 @@ from hapticd.study.accuracy.model import Model, ModelRow
 from hapticd.study.accuracy.telemetry import BatchRow
 from hapticd.study.accuracy.traps import Trap
 from hapticd.study.grid.output import as_csv, as_json
+from hapticd.study.verdict import Criterion
 
 _ALWAYS = ("exact", "explicit-euler x1", "semi-implicit-euler x1", "velocity-verlet x1", "rk4 x1", "exact, float32")
 _ADAPTIVE = ("DOP853 1e-09, runs through", "DOP853 1e-09, stops at")
@@ -198,6 +199,7 @@ class Report:
                 "hapticd": hapticd.__version__,
                 "config": self.name,
                 "duration_s": self.duration_s,
+                "criterion": Criterion().declared(),
                 "sentences": list(self.sentences()),
                 "model": [dict(zip(_COLUMNS, self._cells(row), strict=True)) for row in self.model.rows],
                 "single_over_double": self.single_ratio,

@@ -8,7 +8,6 @@ from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import ConstantForce, Hand, SimulationOptions
 from hapticd.study.accuracy.leak import leak
 
-MASS_KG = 0.5
 STIFFNESS_N_PER_M = 3000.0
 PRESS_N = 5.0
 PERIOD_S = 1e-3

@@ -1,4 +1,4 @@
-"""What a law may do to a stable loop: the published ceilings of a sampled damper bound the damping that it brings."""
+"""What a law's damping would do to a stable loop if it were held: what a sampled damper may is bounded by ceilings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hapticd.study.extremes.verdict import Verdict
 
 
 class Break(IntEnum):
-    """What a law makes of a loop that is stable without it."""
+    """What the damping of a law, held, makes of a loop that is stable without it."""
 
     NONE = 0
     CEILING = 1
@@ -22,23 +22,24 @@ class Break(IntEnum):
     def words(self) -> str:
         """For people."""
         return (
-            "stays stable",
-            "unstable, beyond a published ceiling",
-            "unstable, held by a spring: no ceiling is published",
-            "unstable, and no ceiling allows it",
+            "would be stable with that damping held",
+            "would be unstable with that damping held, beyond a published ceiling",
+            "would be unstable with that damping held, on a spring: no ceiling is published",
+            "is promised less, or would be unstable with that damping held though no ceiling allows it",
         )[self]
 
 
 def law_breaks(place: Place, damping_n_s_per_m: float) -> Break:
-    """What a law makes of a loop that is stable without it.
+    """What the damping of a law, held, makes of a loop that is stable without it.
 
-    A damper on the difference of two samples shakes a bare mass beyond 2, 0.83, 0.54 ... m/T with 0, 1, 2 ... samples
-    of delay, and below that carries a spring up to a stiffness that depends on it; without delay K < (2B/T) (1 - u) /
-    (1 + u), u = BT/2m. The exact eigenvalues of the bare mass say whether wall and damping are beyond that.
+    A law may bring it for a few ticks only, and its loop may stay as stable as it was. A damper on the difference of
+    two samples shakes a bare mass beyond 2, 0.83, 0.54 ... m/T with 0, 1, 2 ... samples of delay, and below that
+    carries a spring up to a stiffness that depends on it; without delay K < (2B/T) (1 - u) / (1 + u), u = BT/2m. The
+    exact eigenvalues of the bare mass say whether wall and damping are beyond that.
 
     Args:
         place: the loop.
-        damping_n_s_per_m: the most damping that the law brought [N s/m].
+        damping_n_s_per_m: the most damping that the law brought in contact [N s/m].
     """
     if damping_n_s_per_m <= 0.0:
         return Break.NONE

@@ -54,7 +54,7 @@ def page(report: Report, picture: bytes, command: str) -> bytes:
         "<h2>As far as double precision goes</h2>",
         f"<p>{len(fine)} findings are within a bound that the run itself gives.</p>",
         _findings(report, fine) if fine else "",
-        "<h2>Stable loops under a law</h2>",
+        "<h2>Stable loops, with the most damping that their law brought</h2>",
         _table(["law", *heads], laws),
     ]
     return (

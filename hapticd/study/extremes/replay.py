@@ -31,7 +31,7 @@ def replay(place: Place) -> list[Line]:
         lines.append(Line(title, text, title not in wrong or bool(wrong[title].explained)))
     lines.append(Line("run", _run(row), "range" not in wrong and "not a number" not in wrong))
     if not math.isnan(row["law_break"]):
-        text = f"{place.law}, {row['damping_n_s_per_m']:.4g} N s/m at the end: {Break(int(row['law_break'])).words}"
+        text = f"{place.law} brings at most {row['damping_n_s_per_m']:.4g} N s/m: {Break(int(row['law_break'])).words}"
         lines.append(Line("law", text, "law" not in wrong))
     explained = [Line(one.kind, f"{one.text}; {one.explained}", True) for one in wrong.values() if one.explained]
     return lines + explained

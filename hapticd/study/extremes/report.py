@@ -17,6 +17,7 @@ from hapticd.study.extremes.place import DRAWN, LAWS, draw
 from hapticd.study.extremes.sweep import BALANCE_SHARE, COLUMNS, TICKS, VALUE_SHARE, Plan
 from hapticd.study.extremes.verdict import MARGIN, Verdict
 from hapticd.study.grid.output import as_json
+from hapticd.study.verdict import Criterion
 
 _MOST_KEPT = 10_000
 
@@ -88,6 +89,7 @@ class Report:
                 "drawn": DRAWN,
                 "ticks": TICKS,
                 "marginal": f"spectral radius within {MARGIN:g} of 1",
+                "criterion": Criterion().declared(),
                 "holds": self.holds,
                 "summary": [asdict(line) for line in self.lines()],
                 "counts": {
@@ -104,7 +106,7 @@ class Report:
         )
 
     def law_counts(self) -> dict[str, dict[str, int]]:
-        """Of each law: what it made of how many stable loops."""
+        """Of each law: in how many stable loops its damping, held, would make what of them."""
         laws = np.array([draw(self.plan.seed, index).law for index in range(self.plan.count)])
         breaks = self.column("law_break")
         return {law: {one.words: int(np.sum((laws == law) & (breaks == one))) for one in Break} for law in LAWS}
@@ -154,11 +156,12 @@ class Report:
     def _laws(self) -> Line:
         breaks = self.column("law_break")
         stable = int(np.sum(~np.isnan(breaks)))
+        damped = int(np.sum(~np.isnan(breaks) & (self.column("damping_n_s_per_m") > 0.0)))
         beyond, held = int(np.sum(breaks == Break.CEILING)), int(np.sum(breaks == Break.HELD))
         _, wrong = self._of("law")
         text = (
-            f"of {stable} stable loops {beyond} become unstable beyond a published ceiling, {held} held by a spring, "
-            f"for which there is none, {wrong} otherwise"
+            f"to {damped} of {stable} stable loops the law brought damping; with the most of it held {beyond} would be "
+            f"unstable beyond a published ceiling, {held} on a spring, for which there is none, {wrong} otherwise"
         )
         return Line("laws", text, wrong == 0)
 

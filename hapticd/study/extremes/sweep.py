@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hapticd import registry
-from hapticd.simulation.batch import Batch, Point
+from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd.simulation.plant import epochs
 from hapticd.study.extremes import books, exact
@@ -55,10 +55,10 @@ COLUMNS = (
 
 refused: 1: by a limit that was due, 2: by one that was not, 0: not. log_growth: logarithm of the spectral radius,
 stepped. stepped, exact: `Verdict`. same_radius: 1 where the exact radius is the stepped one. in_decimals: 1 where
-double precision did not suffice to square the map. ticks, left_range, finite, cycles, damping: of the run. balance,
-wall_balance: residual of all books and of the wall's own, over what went through them; ledger: the same of the largest
-difference to the ledger; *_rounding: a bound of what rounding can do to each. law_break: a `Break`, where the loop is
-stable without its law.
+double precision did not suffice to square the map. ticks, left_range, finite, cycles: of the run. damping_n_s_per_m:
+the most that the law brought in contact. balance, wall_balance: residual of all books and of the wall's own, over what
+went through them; ledger: the same of the largest difference to the ledger; *_rounding: a bound of what rounding can do
+to each. law_break: a `Break`, where the loop is stable without its law.
 """
 
 _PLACES_A_BLOCK = 1250
@@ -179,16 +179,22 @@ def _press(
     column["wall_rounding"][at] = book["wall_rounding_j"] / wall_turnover
     column["ledger"][at] = off / wall_turnover
     column["cycles"][at] = result.cycles
-    column["damping_n_s_per_m"][at] = result.damping_n_s_per_m
+    brought = _most_damping(result.trace)
+    column["damping_n_s_per_m"][at] = brought
     finite = (book["finite"] > 0.0) & ~np.isnan(off)
     column["finite"][at] = finite
-    for here, place, point, damping in zip(at, chosen, points, result.damping_n_s_per_m.tolist(), strict=True):
+    for here, place, most in zip(at, chosen, brought.tolist(), strict=True):
         if column["exact"][here] == Verdict.STABLE:
-            # That of energy cycles never falls; TDPA's comes and goes up to a bound.
-            most = float(point.params.model_dump().get("damping_cap_n_s_per_m", damping))
             promised = _PROMISED[min(place.force_delay_samples, 1)] * place.mass_kg / place.period_s
             over = place.law.endswith("known-mass") and most > promised * (1.0 + 1e-9)
             column["law_break"][here] = Break.FAULT if over else law_breaks(place, most)
+
+
+def _most_damping(traces: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """The largest damping of each run that acted: outside the wall a law sends nothing [N s/m]."""
+    measured_m, damping = (traces[:, :, TRACE_COLUMNS.index(name)] for name in ("x_measured_m", "damping_n_s_per_m"))
+    most: np.ndarray[Any, Any] = np.where(measured_m < 0.0, damping, 0.0).max(axis=1)
+    return most
 
 
 def _block(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:

@@ -10,9 +10,10 @@ import numpy as np
 
 from hapticd.contracts.law import plain_object
 from hapticd.energy import cycle_ended
+from hapticd.simulation.options import SimulationOptions
 from hapticd.study.offline import OfflineRun, Row, Summary
 from hapticd.study.paper.scenarios import Scenario
-from hapticd.study.verdict import Criterion, Outcome
+from hapticd.study.verdict import Criterion, Outcome, balance
 
 Array = np.ndarray[Any, Any]
 
@@ -45,7 +46,10 @@ class Recording:
     def __init__(self, scenario: Scenario, duration_s: float | None = None) -> None:
         self.scenario = scenario
         loaded = scenario.load()
-        self.resolution_m = float(vars(loaded.options)["resolution_m"])
+        assert isinstance(loaded.options, SimulationOptions)
+        self._options = loaded.options
+        self._balance = balance(loaded.options, loaded.config.scene.walls)
+        self.resolution_m = loaded.options.resolution_m
         rows: deque[Row] = deque()
         run = OfflineRun(loaded, scenario.duration_s if duration_s is None else duration_s)
         self.period_s = run.period_s
@@ -94,7 +98,7 @@ class Recording:
 
     def settled_tick(self) -> int | None:
         """The first tick from which on the true position stays in place; None when it does not."""
-        balance_m = self.scenario.balance_m
+        balance_m = self._balance.x_m
         band_m = max(SETTLED_SHARE * abs(balance_m), 3.0 * self.resolution_m)
         outside = np.flatnonzero(np.abs(self.x_m - balance_m) > band_m)
         first = int(outside[-1]) + 1 if outside.size else 0
@@ -113,14 +117,10 @@ class Recording:
         settled = self.settled_tick()
         window = round(summary.window_s / self.period_s)
         before_m = np.ptp(self.x_m[-2 * window : -window]) if len(self.x_m) >= 2 * window else np.nan
-        depth_m = -self.scenario.balance_m
+        depth_m = -self._balance.x_m
         stiffness = summary.displayed_stiffness_n_per_m
         error = None if stiffness is None else stiffness / self.scenario.stiffness_n_per_m - 1.0
-        criterion = Criterion()
-        moving = summary.peak_to_peak_m > max(criterion.still_m, criterion.still_counts * self.resolution_m)
-        place_m = max(criterion.place_share * depth_m, criterion.place_counts * self.resolution_m)
-        elsewhere = abs(summary.mean_depth_m - depth_m) > place_m
-        outcome = Outcome.MOVING if moving else Outcome.ELSEWHERE if elsewhere else Outcome.SETTLED
+        outcome = Criterion().outcome(self._options, self._balance, summary.peak_to_peak_m, -summary.mean_depth_m)
         still_m = max(2.0 * self.resolution_m, STILL_M)
         grows = bool(summary.peak_to_peak_m > 1.1 * before_m + self.resolution_m)
         return Figures(

@@ -13,6 +13,7 @@ from hapticd.study.grid.output import as_json
 from hapticd.study.scene.answers import Answers
 from hapticd.study.scene.study import Scene
 from hapticd.study.scene.ticks import TickCount
+from hapticd.study.verdict import Criterion
 
 _MOST = 10.0
 """Changes beyond this share are all the same to a reader."""
@@ -87,6 +88,7 @@ def json(scene: Scene, ticks: Sequence[TickCount], duration_s: float) -> bytes:
             "config": str(scene.loaded.path),
             "duration_s": duration_s,
             "tolerance": scene.tolerance,
+            "criterion": Criterion().declared(),
             "full": {
                 "verdict": scene.full.verdict,
                 "settled_s": scene.full.settled_s,

@@ -31,7 +31,7 @@ def command(
     ] = "grid",
     duration: Annotated[float, typer.Option(help="Simulated time of a press [s].")] = 5.0,
     starts: Annotated[
-        int, typer.Option(min=1, max=1000, help="Presses of a cell, dropped from 0 to 10 mm higher; all must settle.")
+        int, typer.Option(min=1, max=1000, help="Presses of a cell, evenly from 0 to 10 mm higher; all must settle.")
     ] = 1,
     config: Annotated[
         Path | None, typer.Option(help="Configuration of the press; the shipped omega7 device when not given.")

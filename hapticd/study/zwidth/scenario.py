@@ -33,7 +33,6 @@ class Scenario:
         period_s: time between ticks [s].
         max_force_n: the guard's limit [N].
         velocity_samples: samples that the velocity difference spans.
-        ramp_s: the guard's ramp [s].
     """
 
     device: SimulationOptions
@@ -41,19 +40,10 @@ class Scenario:
     period_s: float
     max_force_n: float
     velocity_samples: int
-    ramp_s: float
 
     def point(self, params: LawParams, criterion: Criterion) -> Point:
         """The press under a law, with the place where it should settle."""
-        point = Point(
-            self.device,
-            self.wall,
-            params,
-            self.period_s,
-            self.max_force_n,
-            self.velocity_samples,
-            self.ramp_s if self.device.initial_position_m < 0.0 else 0.0,
-        )
+        point = Point(self.device, self.wall, params, self.period_s, self.max_force_n, self.velocity_samples)
         return replace(point, target_m=balance_m(point), band_m=criterion.place_limit_m(point))
 
     def loop(self) -> Loop:
@@ -61,13 +51,14 @@ class Scenario:
         hand = self.device.hand
         return Loop(
             mass_kg=self.device.mass_kg + hand.mass_kg,
-            viscous_n_s_per_m=self.device.viscous_n_s_per_m + hand.damping_n_s_per_m,
+            viscous_n_s_per_m=self.device.viscous_n_s_per_m,
             period_s=self.period_s,
             wall_damping_n_s_per_m=self.wall.damping_n_s_per_m,
             delay_samples=self.device.force_delay_samples,
             coulomb_n=coulomb_n(self.device),
             resolution_m=self.device.resolution_m,
             hand_n_per_m=hand.stiffness_n_per_m,
+            hand_n_s_per_m=hand.damping_n_s_per_m,
         )
 
 
@@ -89,13 +80,16 @@ def scenario_of(loaded: LoadedConfig) -> Scenario:
             f"{name}: device.options.hand.force: must come to rest at a press (newton < 0; constant, step or ramp): "
             "a map asks where the device settles"
         )
+    if device.initial_position_m < 0.0:
+        raise ConfigError(
+            f"{name}: device.options.initial_position_m = {device.initial_position_m:g}: must be 0 or more: inside the "
+            "wall the daemon ramps the force up, which the engine of a map leaves out"
+        )
     limit_n = math.inf
     if config.safety.profile != "simulation":
         limits = (config.safety.max_force_n, config.safety.max_axis_force_n, device.max_force_n or math.inf)
         limit_n = min(limit for limit in limits if limit is not None)
-    return Scenario(
-        device, config.scene.walls[0], config.loop.period_s, limit_n, config.velocity.samples, config.safety.ramp_s
-    )
+    return Scenario(device, config.scene.walls[0], config.loop.period_s, limit_n, config.velocity.samples)
 
 
 def changing(scenario: Scenario) -> set[str]:

@@ -35,8 +35,6 @@ EDGE_COLUMNS = ("settles_at_low_end", "settles_at_high_end", "edge_low", "edge_h
 
 STARTS_SPREAD_M = 0.01
 _TICKS_PER_BLOCK = 4e6
-_CELL_BYTES = 900.0
-"""Of one cell in rows, tables and pictures, measured generously."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +48,7 @@ class Plan:
         x, y: the axes.
         method: grid: every cell; bisect: along x the one edge of each line.
         duration_s: simulated time of a press [s].
-        starts: presses of a cell, dropped from evenly spread heights.
+        starts: presses of a cell, from its own start to 10 mm higher, evenly spread.
         criterion: what settled means.
     """
 
@@ -68,11 +66,6 @@ class Plan:
     def cells(self) -> int:
         """Cells of one law; with bisection, lines."""
         return len(self.y.values) * (len(self.x.values) if self.method == "grid" else 1)
-
-    @property
-    def need_bytes(self) -> float:
-        """Memory that the results take at most."""
-        return _CELL_BYTES * self.cells * len(self.readings)
 
     def job(self) -> Job:
         """The map cut into blocks, as many for each law."""
@@ -182,7 +175,7 @@ class _Press:
         from_m = scenario.device.initial_position_m
         points = []
         for start in range(self._starts):
-            drop_m = from_m + STARTS_SPREAD_M * start / self._starts
+            drop_m = from_m + STARTS_SPREAD_M * start / max(1, self._starts - 1)
             device = scenario.device.model_copy(update={"initial_position_m": drop_m})
             points.append(replace(scenario, device=device).point(self._params, self._criterion))
         return points
