@@ -29,17 +29,14 @@ class Asked:
     Attributes:
         points: the loops.
         outcome: the verdict on each, by the criterion of every study.
-        peak_to_peak_m, mean_depth_m, damping_n_s_per_m, peak_force_n, settled_s, cycles: as in `BatchResult`.
+        peak_to_peak_m, damping_n_s_per_m, settled_s: as in `BatchResult`.
     """
 
     points: Sequence[Point]
     outcome: Array = field(default_factory=lambda: np.empty(0))
     peak_to_peak_m: Array = field(default_factory=lambda: np.empty(0))
-    mean_depth_m: Array = field(default_factory=lambda: np.empty(0))
     damping_n_s_per_m: Array = field(default_factory=lambda: np.empty(0))
-    peak_force_n: Array = field(default_factory=lambda: np.empty(0))
     settled_s: Array = field(default_factory=lambda: np.empty(0))
-    cycles: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def settled(self) -> Array:
@@ -92,11 +89,8 @@ class Runs:
                 first = part.stop
                 asked.outcome = outcome[part]
                 asked.peak_to_peak_m = np.where(result.finite, result.peak_to_peak_m, np.inf)[part]
-                asked.mean_depth_m = result.mean_depth_m[part]
                 asked.damping_n_s_per_m = result.damping_n_s_per_m[part]
-                asked.peak_force_n = result.peak_force_n[part]
                 asked.settled_s = result.settled_s[part]
-                asked.cycles = result.cycles[part]
 
 
 def _result(law: str, points: Sequence[Point], duration_s: float, progress: Callable[[int], None]) -> BatchResult:
