@@ -136,11 +136,14 @@ def test_nothing_that_is_asked_leaves_a_cycle_for_the_collector_which_is_off_in_
     bench.ticks(1)
     for letter in letters:  # what is made once is made now
         bench.ask(**letter)
-    gc.collect()
+    found = []
     gc.disable()
     try:
-        for letter in letters:
-            bench.ask(**letter)
-        assert gc.collect() == 0
+        for _ in range(3):  # a thread of another test may end meanwhile, but only once
+            gc.collect()
+            for letter in letters:
+                bench.ask(**letter)
+            found.append(gc.collect())
     finally:
         gc.enable()
+    assert min(found) == 0
