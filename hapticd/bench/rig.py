@@ -32,7 +32,7 @@ from hapticd.bench.tick.spawned import Spawned
 from hapticd.config.models import LoopConfig
 from hapticd.contracts.driver import Driver
 from hapticd.contracts.errors import HapticdError
-from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
+from hapticd.control.realtime import become_realtime, die_with_parent, sleep_until
 from hapticd.share import directory
 
 RATE_HZ = 1000.0
@@ -157,7 +157,6 @@ def _measure_line(connection: Connection, peer: Path, ticks: int) -> None:
 
 def _paced(driver: Driver[Any], bare: int, ticks: int, progress: Progress) -> tuple[list[float], list[float]]:
     """The share of each tick that the driver takes, and the bare one [us]."""
-    sleep_until = make_sleeper()
     force_n = [0.1]
 
     def drive() -> None:

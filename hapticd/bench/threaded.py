@@ -21,7 +21,7 @@ from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.record import RecordLayout
 from hapticd.control.loop import ControlLoop
 from hapticd.control.process import make_tick, place_device
-from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
+from hapticd.control.realtime import become_realtime, die_with_parent, sleep_until
 from hapticd.control.shared import SUPERVISOR_BEAT, SharedMemory
 from hapticd.supervisor.service import DRAIN_S
 from hapticd.telemetry.publisher import Publisher
@@ -42,7 +42,7 @@ def serve_threaded(connection: Connection, text: str, heavy: bool) -> None:
         shared = SharedMemory(layout, settings.loop.rate_hz)
         kept = KeptRecords(shared, heavy)
         control = ControlLoop(
-            driver, make_tick(config, info), shared, settings.loop, settings.safety, True, make_sleeper()
+            driver, make_tick(config, info), shared, settings.loop, settings.safety, True, sleep_until
         )
         done = threading.Event()
 

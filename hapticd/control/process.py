@@ -31,7 +31,7 @@ from hapticd.contracts.record import RecordLayout
 from hapticd.control.contact import RunningLaw
 from hapticd.control.loop import ControlLoop
 from hapticd.control.predecessor import Predecessor, identity
-from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
+from hapticd.control.realtime import become_realtime, die_with_parent, sleep_until
 from hapticd.control.shared import SUPERVISOR_BEAT, SharedMemory
 from hapticd.control.tick import ControlTick
 from hapticd.guard import Guard
@@ -124,7 +124,7 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
             settings.loop,
             settings.safety,
             (info.simulated or settings.safety.auto_arm) and before.may_arm,
-            make_sleeper(),
+            sleep_until,
             before,
         )
         for name, law in _installed_laws().items():

@@ -12,7 +12,7 @@ from array import array
 from typing import Any
 
 from hapticd.config.models import LoopConfig
-from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
+from hapticd.control.realtime import become_realtime, die_with_parent, sleep_until
 
 
 def main() -> None:
@@ -34,7 +34,6 @@ def measured(loop: LoopConfig, seconds: float) -> dict[str, Any]:
     period_ns = loop.period_ns
     expected = max(1, round(seconds * 1e9 / period_ns))
     late_ns = array("q", bytes(8 * expected))
-    sleep_until = make_sleeper()
     clock_ns = time.monotonic_ns
     problems, _ = become_realtime(loop)
     ticks = skipped = 0

@@ -20,7 +20,7 @@ from hapticd.bench.tick.spawned import Spawned
 from hapticd.config.loading import parse
 from hapticd.config.models import LoopConfig
 from hapticd.contracts.errors import HapticdError
-from hapticd.control.realtime import become_realtime, die_with_parent, make_sleeper
+from hapticd.control.realtime import become_realtime, die_with_parent, sleep_until
 
 ROUNDS = 10
 """Every case is measured in so many blocks, in a new random order each time, so that all see the same machine."""
@@ -160,7 +160,6 @@ def _measure_bodies(connection: Connection, found: Sequence[Case], ticks: int, r
                 sample.count()
             del sample.hot[:]
         problems, advice = become_realtime(LoopConfig())
-        sleep_until = make_sleeper()
         order = list(samples)
         for block in (ticks * (number + 1) // rounds - ticks * number // rounds for number in range(rounds)):
             random.shuffle(order)
