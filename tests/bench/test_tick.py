@@ -14,7 +14,7 @@ from hapticd import cli, registry
 from hapticd.bench import Quantiles, tick
 from hapticd.bench.compiling import compile_c
 from hapticd.bench.tick import Body, Ticks
-from hapticd.bench.tick.memory import PAGES, MemoryReader
+from hapticd.bench.tick.memory import MemoryReader
 from hapticd.config.loading import parse
 from hapticd.contracts.errors import HapticdError
 
@@ -39,7 +39,7 @@ def stop() -> None:
 
 def body(group: str, p99_us: float, problem: str = "", name: str = "some", over: float = 0.0) -> Body:
     us = Quantiles(1000, p99_us / 2, p99_us, p99_us, p99_us)
-    return Body(group, name, us, us, p99_us * 1e-3, over, 300, 1.0, 1.0, 1.0, problem)
+    return Body(group, name, us, us, p99_us * 1e-3, over, 1.0, 1.0, 1.0, problem)
 
 
 class TestStopwatch:
@@ -170,9 +170,6 @@ def test_bench_tick_measures_every_installed_law(capsys: pytest.CaptureFixture[s
         assert each["problem"] == ""
         assert each["paced_us"]["count"] == each["hot_us"]["count"] == 100
         assert 0.0 < each["paced_us"]["p50"] <= each["paced_us"]["p99"] <= each["paced_us"]["max"]
-    pages = {each["name"]: each["pages"] for each in report["bodies"]}
-    assert pages["memory in C"] >= PAGES
-    assert pages["energy-cycle"] - pages["empty loop"] >= 0.6 * PAGES
     assert report["bodies"][0]["p50_ratio"] == 1.0
     assert [piece["name"] for piece in report["pieces"]] == ["nothing", "read", "step", "write", "record"]
     assert all(piece["us"]["count"] == 100 for piece in report["pieces"])

@@ -15,7 +15,7 @@ from typing import Any
 from hapticd.bench import Progress, Quantiles, ratio
 from hapticd.bench.tick.block import arithmetic, nothing, run_loop, run_reference
 from hapticd.bench.tick.case import BAR, RATE_HZ, WARM_TICKS, Case
-from hapticd.bench.tick.memory import MemoryReader, touched_pages
+from hapticd.bench.tick.memory import MemoryReader
 from hapticd.bench.tick.spawned import Spawned
 from hapticd.config.loading import parse
 from hapticd.config.models import LoopConfig
@@ -38,7 +38,6 @@ class Body:
         hot_us: back to back [us].
         of_period: p99 of `paced_us` as a share of the period.
         over: share of the paced ticks that took more than `BAR` of the period.
-        pages: of memory that a tick touches, the counting included; 0 where the kernel does not tell.
         p50_ratio, p99_ratio, hot_ratio: next to the reference, paced and hot (p50).
         problem: why it could not be measured, empty when it could.
     """
@@ -49,7 +48,6 @@ class Body:
     hot_us: Quantiles
     of_period: float
     over: float
-    pages: int
     p50_ratio: float
     p99_ratio: float
     hot_ratio: float
@@ -114,7 +112,6 @@ class _Samples:
         self.paced: array[int] = array("q")
         self.hot: array[int] = array("q")
         self.pieces: dict[str, list[int]] = {name: [] for name in _PIECES} if case.pieces else {}
-        self.pages = 0
         self.problem = ""
         self._work: Callable[[], Any] = arithmetic if case.name == "arithmetic" else nothing
         if case.name == "memory in C":
@@ -122,11 +119,6 @@ class _Samples:
                 self._work = MemoryReader()
             except HapticdError as error:
                 self.problem = str(error)
-
-    def count(self) -> None:
-        """Count the pages that a tick touches."""
-        self.pages = touched_pages(lambda sleep_until: self.run(WARM_TICKS, sleep_until))
-        del self.paced[:]
 
     def run(self, ticks: int, sleep_until: Callable[[int], int] | None) -> None:
         """Measure one more block."""
@@ -156,8 +148,6 @@ def _measure_bodies(connection: Connection, found: Sequence[Case], ticks: int, r
         samples = [_Samples(case) for case in found]
         for sample in samples:
             sample.run(WARM_TICKS, None)  # first calls, before memory is locked
-            if not sample.pieces:
-                sample.count()
             del sample.hot[:]
         problems, advice = become_realtime(LoopConfig())
         order = list(samples)
@@ -190,7 +180,6 @@ def _bodies(samples: Sequence[_Samples]) -> list[Body]:
                 hot_us=hot,
                 of_period=paced.p99 * 1e-6 * RATE_HZ,
                 over=ratio(sum(spent > BAR * 1e9 / RATE_HZ for spent in sample.paced), len(sample.paced)),
-                pages=sample.pages,
                 p50_ratio=ratio(paced.p50, reference.paced_us.p50) if reference else 1.0,
                 p99_ratio=ratio(paced.p99, reference.paced_us.p99) if reference else 1.0,
                 hot_ratio=ratio(hot.p50, reference.hot_us.p50) if reference else 1.0,

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import ctypes
 import mmap
-import os
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 from hapticd.bench.compiling import compile_c
-from hapticd.bench.tick.case import WARM_TICKS
 
 PAGES = 250
-"""What a tick of energy-cycle on one wall touches at least: `touched_pages` less an empty loop's."""
+"""Fewer than a tick touches: 300 to 400, as the kernel counts them in /proc/PID/smaps after /proc/PID/clear_refs."""
 
 _REGIONS = 10
 _SOURCE = Path(__file__).with_name("memory.c")
@@ -50,36 +47,3 @@ class MemoryReader:
     def __call__(self) -> None:
         """Read them."""
         self._read_pages(self._at, PAGES)
-
-
-def touched_pages(run: Callable[[Callable[[int], int]], None]) -> int:
-    """Pages of memory that one tick touches; 0 where the kernel does not tell.
-
-    The counting's own are among them: what it gives for an empty loop.
-
-    Args:
-        run: runs a loop of at least `WARM_TICKS` + 2 ticks on the sleep that it is given.
-    """
-    try:
-        clear = os.open("/proc/self/clear_refs", os.O_WRONLY)
-    except OSError:
-        return 0
-    sums = os.open("/proc/self/smaps_rollup", os.O_RDONLY)
-    ticks = touched = 0
-
-    def sleep_until(deadline_ns: int) -> int:
-        nonlocal ticks, touched
-        ticks += 1
-        if ticks == WARM_TICKS:
-            os.write(clear, b"1")
-        elif ticks == WARM_TICKS + 1:
-            lines = os.pread(sums, 4096, 0).decode().splitlines()
-            touched = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("Referenced:"))
-        return deadline_ns
-
-    try:
-        run(sleep_until)
-    finally:
-        os.close(clear)
-        os.close(sums)
-    return touched // mmap.PAGESIZE
