@@ -31,7 +31,8 @@ class Cluster:
         self._folder = folder
         self._processes: list[subprocess.Popen[bytes]] = []
         self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-jupyter")
-        wait(self.address.exists)
+        # The file is there before its text is.
+        wait(lambda: self.address.exists() and self.address.read_text().rstrip().endswith("}"))
         self.url: str = json.loads(self.address.read_text())["address"]
         self.workers = [self._start("worker", "--no-nanny", "--nthreads", "1", "--no-dashboard") for _ in range(2)]
 
