@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,58 +17,49 @@ CONFIG = Path(__file__).parents[2] / "config" / "hapticd.toml"
 CTRL_S, CTRL_Q = b"\x13", b"\x11"
 
 
-def test_from_one_command_to_a_live_view_and_back(tmp_path: Path) -> None:
-    text = CONFIG.read_text().replace('tcp = "tcp://127.0.0.1:9872"', "")
-    config = tmp_path / "lab.toml"
+@contextmanager
+def watched(place: Path, text: str) -> Iterator[Terminal]:
+    """A daemon on a terminal with a view of it; its runtime directory is the place."""
+    config = place / "lab.toml"
     config.write_text(text)
     command = (HAPTICD, "run", "--config", str(config), "--watch")
-    terminal = Terminal(*command, environment={"HAPTICD_RUNTIME_DIR": str(tmp_path)})
+    terminal = Terminal(*command, environment={"HAPTICD_RUNTIME_DIR": str(place)})
     try:
+        yield terminal
+    finally:
+        terminal.close()
+
+
+def test_from_one_command_to_a_live_view_and_back(tmp_path: Path) -> None:
+    text = CONFIG.read_text().replace('tcp = "tcp://127.0.0.1:9872"', "")
+    with watched(tmp_path, text) as terminal:
         terminal.until("ARMED")
         terminal.until("energy-cycle")
         terminal.type(b"q")
         terminal.until("stopped")
         assert terminal.process.wait(PATIENCE_S) == 0
         assert not list((tmp_path / "default").iterdir()), "the daemon has cleaned up after itself"
-    finally:
-        terminal.close()
 
 
 def test_a_daemon_that_cannot_start_says_why_and_ends_the_view(tmp_path: Path) -> None:
-    config = tmp_path / "lab.toml"
-    config.write_text("[safety]\nmax_force_n = 500.0\n")
-    command = (HAPTICD, "run", "--config", str(config), "--watch")
-    terminal = Terminal(*command, environment={"HAPTICD_RUNTIME_DIR": str(tmp_path)})
-    try:
+    with watched(tmp_path, "[safety]\nmax_force_n = 500.0\n") as terminal:
         terminal.until("safety.max_force_n")
         assert terminal.process.wait(PATIENCE_S) == 2
-    finally:
-        terminal.close()
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
 def test_a_daemon_does_not_outlive_whoever_started_it_with_a_view(tmp_path: Path, end: signal.Signals) -> None:
     """Else an armed device would go on with nobody before it."""
-    config = tmp_path / "lab.toml"
-    config.write_text("")
-    command = (HAPTICD, "run", "--config", str(config), "--watch")
-    terminal = Terminal(*command, environment={"HAPTICD_RUNTIME_DIR": str(tmp_path)})
-    try:
+    with watched(tmp_path, "") as terminal:
         terminal.until("ARMED")
         terminal.process.send_signal(end)
         terminal.process.wait(PATIENCE_S)
         wait_until(lambda: not list((tmp_path / "default").iterdir()), "the daemon to end")
-    finally:
-        terminal.close()
 
 
 def test_a_view_that_a_stopped_terminal_holds_up_keeps_no_daemon(tmp_path: Path) -> None:
     """Nor its force: the view cannot even say that it ends."""
-    config = tmp_path / "lab.toml"
-    config.write_text("")
-    command = (HAPTICD, "run", "--config", str(config), "--watch")
-    terminal = Terminal(*command, environment={"HAPTICD_RUNTIME_DIR": str(tmp_path)})
-    try:
+    with watched(tmp_path, "") as terminal:
         terminal.until("ARMED")
         terminal.type(CTRL_S)
         terminal.process.send_signal(signal.SIGINT)
@@ -74,5 +67,3 @@ def test_a_view_that_a_stopped_terminal_holds_up_keeps_no_daemon(tmp_path: Path)
         terminal.type(CTRL_Q)
         terminal.until("stopped")
         assert terminal.process.wait(PATIENCE_S) == 0
-    finally:
-        terminal.close()
