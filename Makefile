@@ -32,7 +32,7 @@ run: $(READY)
 
 # Most of the time is spent waiting for daemons that run in real time, so more workers than processors.
 test: packages lint
-	$(BIN)/pytest --numprocesses 4 --dist loadfile
+	$(BIN)/pytest --numprocesses 4 --dist loadfile --max-worker-restart 1
 
 lint: $(READY)
 	$(BIN)/ruff check
@@ -41,7 +41,7 @@ lint: $(READY)
 	$(BIN)/lint-imports
 
 nightly: packages $(READY)
-	$(BIN)/pytest -m nightly --timeout 3600
+	$(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
 
 bench: $(READY)
 	$(BIN)/hapticd bench
