@@ -32,7 +32,7 @@ run: $(READY)
 
 # Most of the time is spent waiting for daemons that run in real time, so more workers than processors.
 test: packages lint
-	$(BIN)/pytest --numprocesses 4 --dist loadfile --max-worker-restart 1
+	$(BIN)/pytest --numprocesses 4 --dist loadfile --max-worker-restart 0
 
 lint: $(READY)
 	$(BIN)/ruff check
