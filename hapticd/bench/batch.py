@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import get_num_threads
 
 from hapticd import registry
 from hapticd.bench.compiling import compile_c
 from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.options import SimulationOptions
+from hapticd.simulation.threads import cores
 
 _C_TYPES = {"float64": "double", "int64": "int64_t", "bool": "bool"}
 _STRUCTS = {
@@ -104,7 +104,7 @@ def measure(points: int, seconds: float, repeats: int) -> Figures:
         equal = reference.agrees_with(batch)
     c, one, both = (ticks / best[name] * 1e-6 for name in ("c", "one", "all"))
     plain = few_ticks / best["plain"] * 1e-6
-    return Figures(get_num_threads(), c, one, both, plain, one / c, both / c, plain / c, os.getloadavg()[0], equal)
+    return Figures(cores(), c, one, both, plain, one / c, both / c, plain / c, os.getloadavg()[0], equal)
 
 
 class Reference:

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from types import ModuleType
 
-from numba import get_num_threads, set_num_threads
-
 from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.law import state_fields
 from hapticd.energy import EnergyLedger
@@ -19,9 +17,7 @@ from hapticd.simulation.batch.point import Point
 from hapticd.simulation.batch.prepare import Prepared
 from hapticd.simulation.batch.result import BatchResult, result_of
 from hapticd.simulation.plant import Buffers, terms
-
-CHUNK = 64
-"""Fewest points between two calls of `progress`."""
+from hapticd.simulation.threads import in_threads
 
 
 class Batch:
@@ -79,7 +75,7 @@ class Batch:
 
         Args:
             workers: threads; None: one a core.
-            progress: told now and then how many points are done.
+            progress: told now and then how many points have been done since it was last told.
 
         Raises:
             PluginError: the law cannot be compiled.
@@ -98,19 +94,8 @@ class Batch:
 
     def run_on(self, arrays: Arrays, workers: int | None = None, progress: Callable[[int], None] | None = None) -> None:
         """Run every point as machine code, from and into these arrays; called again, it goes on where it was."""
-        sweep = machine_code(self.law, tuple(sorted(self._switches.items())))
-        count = len(self._prepared)
-        step = max(CHUNK, -(-count // 50)) if progress else count
-        threads = get_num_threads()
-        set_num_threads(min(workers or threads, threads))
-        try:
-            for first in range(0, count, step):
-                stop = min(first + step, count)
-                sweep(first, stop, arrays)
-                if progress:
-                    progress(stop)
-        finally:
-            set_num_threads(threads)
+        code = machine_code(self.law, tuple(sorted(self._switches.items())))
+        in_threads(code, len(self._prepared), arrays, workers=workers, progress=progress)
 
     def run_interpreted(self) -> BatchResult:
         """Run every point as plain Python: the same numbers, about a hundred times slower."""

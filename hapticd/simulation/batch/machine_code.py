@@ -1,4 +1,4 @@
-"""The loop as machine code, over all points of a batch side by side."""
+"""The loop as machine code, over the points of a batch."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from functools import lru_cache
 from types import ModuleType
 from typing import Any
 
-from numba import njit, prange
+from numba import njit
 
 from hapticd.energy import EnergyLedger
 from hapticd.simulation.batch.kernel import LoopBuffers, bound
@@ -16,7 +16,7 @@ from hapticd.simulation.plant import Buffers
 
 @lru_cache(maxsize=32)
 def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any:
-    """A function of a first point, the point to stop at and `Arrays`, that runs these points on all threads.
+    """A function of a first point, the point to stop at and `Arrays`, that runs these points.
 
     Raises:
         PluginError: the law cannot be compiled.
@@ -54,9 +54,9 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
         arrays.law_states[at] = law_state
         arrays.ledgers[at] = ledger
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
+    @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def sweep(first: Any, stop: Any, arrays: Any) -> None:
-        for at in prange(first, stop):
+        for at in range(first, stop):
             one(at, arrays)
 
     return sweep

@@ -21,11 +21,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from hapticd.simulation.batch import TRACE_COLUMNS
 from hapticd.simulation.batch.kernel import FARTHEST_M, MOST_M_PER_S
 from hapticd.simulation.compile import OPTIONS, compiled, on_stack
+from hapticd.simulation.threads import in_threads
 from hapticd.study.extremes.exact import free_period, friction_integrals
 from hapticd.study.extremes.place import Place
 
@@ -212,7 +213,7 @@ def balances(traces: np.ndarray[Any, Any], runs: Sequence[dict[str, float]]) -> 
     for name in GIVEN:
         table[name] = [run[name] for run in runs]
     found = np.zeros((len(runs), len(FOUND)))
-    _machine_code()(traces, table, found)
+    in_threads(_machine_code(), len(runs), traces, table, found)
     return found
 
 
@@ -220,9 +221,9 @@ def balances(traces: np.ndarray[Any, Any], runs: Sequence[dict[str, float]]) -> 
 def _machine_code() -> Any:
     one = compiled(balance)
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
-    def sweep(traces: Any, runs: Any, found: Any) -> None:
-        for at in prange(len(runs)):
+    @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
+    def sweep(first: Any, stop: Any, traces: Any, runs: Any, found: Any) -> None:
+        for at in range(first, stop):
             one(traces[at], on_stack(runs[at]), found[at])
 
     return sweep

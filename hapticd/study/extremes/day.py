@@ -14,13 +14,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from hapticd import registry
 from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point
 from hapticd.simulation.compile import OPTIONS, compiled
 from hapticd.simulation.options import SimulationOptions
+from hapticd.simulation.threads import in_threads
 from hapticd.study.verdict import Criterion, Outcome
 
 LAW = "energy-cycle"
@@ -109,7 +110,7 @@ def run_days(ticks: int = DAY_TICKS, progress: Callable[[int], None] | None = No
     counted = []
     for chunk in range(chunks):
         batch.run_on(arrays)
-        _sweep()(arrays.traces, STIFFNESS_N_PER_M, sums)
+        in_threads(_sweep(), len(points), arrays.traces, STIFFNESS_N_PER_M, sums)
         counted.append(arrays.ledgers["cycle"].copy())
         if progress:
             progress((chunk + 1) * chunk_ticks)
@@ -217,9 +218,9 @@ def add_product(sums: Any, at: int, left: float, right: float) -> None:
 def _sweep() -> Any:
     one = compiled(enter)
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
-    def sweep(traces: Any, stiffness: float, sums: Any) -> None:
-        for at in prange(len(traces)):
+    @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
+    def sweep(first: Any, stop: Any, traces: Any, stiffness: float, sums: Any) -> None:
+        for at in range(first, stop):
             one(traces[at], stiffness, sums[at])
 
     return sweep

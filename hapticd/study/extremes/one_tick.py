@@ -14,13 +14,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from hapticd.simulation.batch.fields import hints, plain, records
 from hapticd.simulation.compile import OPTIONS, compiled, on_stack
 from hapticd.simulation.options import SimulationOptions
 from hapticd.simulation.plant import Buffers, PlantParams, PlantState, epochs, move, start_state, terms
 from hapticd.simulation.specialise import specialise
+from hapticd.simulation.threads import in_threads
 from hapticd.study.extremes.place import Place
 
 SQUARINGS = 44
@@ -134,7 +135,7 @@ def growths(places: Sequence[Place], options: Sequence[SimulationOptions]) -> np
     found = np.empty(len(places))
     plants, params, walls, units = _arrays(places, options)
     delays = np.array([place.force_delay_samples for place in places])
-    _machine_code()(plants, params, walls, units, delays, found)
+    in_threads(_machine_code(), len(places), plants, params, walls, units, delays, found)
     return found
 
 
@@ -170,9 +171,9 @@ def _stepper() -> Any:
 def _machine_code() -> Any:
     step, grow = compiled(_stepper()), compiled(log_growth)
 
-    @njit(parallel=True, **OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
-    def sweep(plants: Any, params: Any, walls: Any, units: Any, delays: Any, found: Any) -> None:
-        for at in prange(len(plants)):
+    @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
+    def sweep(first: Any, stop: Any, plants: Any, params: Any, walls: Any, units: Any, delays: Any, found: Any) -> None:
+        for at in range(first, stop):
             size = delays[at] + 3
             columns = np.empty((size, size))
             plant = on_stack(plants[at])

@@ -99,11 +99,4 @@ def _result(law: str, points: Sequence[Point], duration_s: float, progress: Call
         result = batch.run_interpreted()
         progress(len(points))
         return result
-    done = 0
-
-    def tell(points_done: int) -> None:
-        nonlocal done
-        progress(points_done - done)
-        done = points_done
-
-    return batch.run(progress=tell)
+    return batch.run(progress=progress)
