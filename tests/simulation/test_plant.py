@@ -134,6 +134,21 @@ def test_a_spring_with_friction_stops_off_centre_after_the_textbook_half_swings(
     assert mover.x_m == pytest.approx(side * amplitude, abs=1e-14)
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("damping", [0.7, 1.0, 30.0])
+@pytest.mark.parametrize("spring", [1e4, 1e5])
+def test_what_creeps_to_rest_within_a_period_rests_at_the_edge_of_friction(
+    way: float, damping: float, spring: float
+) -> None:
+    """Overdamped it never swings, and the speed at the end of the period is rounded away, or to the other sign."""
+    mover = device(0.01, mass_kg=1e-6, viscous_n_s_per_m=damping, coulomb_n=0.1, hand={"stiffness_n_per_m": spring})
+    for _ in range(400):
+        mover.advance(2.0 * way)
+        assert 0.0 < mover.x_m * way <= 1.9 / spring * (1.0 + 1e-12)
+    assert mover.x_m == pytest.approx(1.9 / spring * way, rel=1e-6)
+    assert abs(mover.v_m_per_s) < 1e-12
+
+
 @pytest.mark.parametrize("case", range(60))
 def test_a_period_with_friction_is_the_one_that_an_event_integrator_finds(case: int) -> None:
     """Slides, stops, stops and turns, turns several times within one period."""

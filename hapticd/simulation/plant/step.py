@@ -118,7 +118,10 @@ def stand_still(state: PlantState, params: PlantParams, force_n: float) -> None:
         push = push_n / params.mass_kg
         v_per_v, v_per_a, x_per_a = flow(params.decay_per_s, params.stiffness_per_s2, left_s)
         end_v = v * v_per_v + push * v_per_a
-        stops = end_v == 0.0 or (end_v > 0.0) != outward or params.half_swing_s <= left_s
+        # From a standstill only a swing comes to the next one; without one an end speed of 0 has been rounded away.
+        stops = params.half_swing_s <= left_s
+        if v != 0.0:
+            stops = stops or end_v == 0.0 or (end_v > 0.0) != outward
         t_s = left_s
         if stops and v == 0.0:
             t_s = params.half_swing_s
@@ -147,6 +150,6 @@ def stand_still(state: PlantState, params: PlantParams, force_n: float) -> None:
         v_per_v, v_per_a, x_per_a = flow(params.decay_per_s, params.stiffness_per_s2, t_s)
         state.x_m = x + (v * v_per_a + push * x_per_a)
         state.v_m_per_s = v * v_per_v + push * v_per_a
-        if stops:
+        if stops or (state.v_m_per_s > 0.0) != outward:  # rounding may turn what has come to rest around
             state.v_m_per_s = 0.0
         left_s = left_s - t_s
