@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hapticd.energy import EnergyLedger, cycle_ended
 
-REPEATABLE = settings(derandomize=True, deadline=None)
+REPEATABLE = settings(derandomize=True)
 
 # Few levels, so that equal samples, falls and rises of every length come up.
 LEVELS = st.lists(st.tuples(st.integers(-3, 3).map(float), st.sampled_from([True, True, True, False])), max_size=80)

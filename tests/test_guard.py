@@ -16,7 +16,7 @@ from hapticd.contracts.driver import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, blended, start_blend
 
-REPEATABLE = settings(derandomize=True, deadline=None)
+REPEATABLE = settings(derandomize=True)
 
 PERIOD_S = 1e-3
 FORCES = st.lists(st.floats(-1e18, 1e18), min_size=1, max_size=3)

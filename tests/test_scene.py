@@ -14,7 +14,7 @@ from hapticd.contracts.driver import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.scene import Wall, compile_walls
 
-REPEATABLE = settings(derandomize=True, deadline=None)
+REPEATABLE = settings(derandomize=True)
 
 
 def wall(stiffness_n_per_m: float = 1000.0, period_s: float = 1e-3, **keys: Any) -> Wall:

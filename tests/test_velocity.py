@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hapticd.config.models import VelocityConfig
 from hapticd.velocity import AdaptiveWindow, Difference, Estimator, LongDifference, LowPass, make_estimator
 
-REPEATABLE = settings(derandomize=True, deadline=None)
+REPEATABLE = settings(derandomize=True)
 
 STEPS_S = st.lists(st.floats(1e-5, 0.5), min_size=1, max_size=200)
 ALL = [

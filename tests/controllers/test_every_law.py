@@ -129,7 +129,7 @@ def hostile_ticks(draw: st.DrawFn) -> list[LawTick]:
 
 @each_law
 @given(ticks=hostile_ticks(), data=st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_finite_ticks_give_a_finite_force_and_a_state_of_numbers(
     law: ModuleType, ticks: list[LawTick], data: st.DataObject
 ) -> None:

@@ -213,7 +213,7 @@ def test_garbage_at_either_port_disturbs_nobody_and_leaves_no_file_handle() -> N
         endpoints.turn_until(lambda: laptop.received() > 0, "the status")
         before = open_files()
 
-        @settings(deadline=None, max_examples=100)
+        @settings(max_examples=100)
         @given(st.sampled_from([endpoints.telemetry, endpoints.control]), BEGINNINGS, st.binary(max_size=300))
         def throw(endpoint: str, beginning: bytes, rest: bytes) -> None:
             address = urlsplit(endpoint)
@@ -242,7 +242,7 @@ def test_whoever_says_nothing_is_disconnected(monkeypatch: pytest.MonkeyPatch) -
                     pass
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.lists(st.binary(max_size=200), min_size=1, max_size=4))
 def test_whatever_a_listed_client_sends_is_answered(frames: list[bytes]) -> None:
     with served() as endpoints:

@@ -63,7 +63,7 @@ OPTIONS = st.fixed_dictionaries(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=400)
+@settings(derandomize=True, max_examples=400)
 @given(keys=OPTIONS, period_s=decades(-6, 1), force_n=st.floats(-1e6, 1e6))
 def test_a_device_gives_numbers_or_names_the_option_that_goes_too_far(
     keys: dict[str, Any], period_s: float, force_n: float

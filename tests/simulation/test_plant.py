@@ -419,7 +419,7 @@ anything = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(keys=anything, period=st.floats(1e-4, 1e-2), forces=st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30))
 def test_finite_goes_in_and_finite_comes_out(keys: dict[str, Any], period: float, forces: list[float]) -> None:
     try:

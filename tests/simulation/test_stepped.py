@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd import registry
@@ -116,7 +116,6 @@ def test_with_friction_more_substeps_come_to_the_exact_slide_and_stop(integrator
     assert errors[2] < 1e-6
 
 
-@settings(deadline=None)
 @given(
     integrator=st.sampled_from(STEPPED),
     substeps=st.integers(1, 20),
@@ -133,7 +132,6 @@ def test_what_friction_can_hold_does_not_creep(
     assert (mover.x_m, mover.v_m_per_s) == (0.01, 0.0)
 
 
-@settings(deadline=None)
 @given(
     integrator=st.sampled_from(STEPPED),
     substeps=st.integers(1, 20),

@@ -159,7 +159,7 @@ def test_at_contact_events_pay_only_where_the_tolerance_is_tight() -> None:
     assert math.log10(fourth[1] / fourth[2]) < 2.5
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     mass=st.floats(0.05, 2.0),
     damping=st.floats(0.0, 5.0),

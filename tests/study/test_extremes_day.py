@@ -29,7 +29,7 @@ from hapticd.study.extremes.day import (
 NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False).filter(lambda value: value == 0.0 or abs(value) > 1e-100)
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(pairs=st.lists(st.tuples(NUMBERS, NUMBERS), max_size=60))
 def test_a_sum_of_products_keeps_what_a_double_loses(pairs: list[tuple[float, float]]) -> None:
     sums = np.zeros(2)

@@ -257,7 +257,6 @@ KEYS = st.sampled_from(["timestamp", "seq", "position_m", "code", "text", "schem
 TREES = st.recursive(PLAIN, lambda inner: st.lists(inner) | st.dictionaries(KEYS, inner), max_leaves=20)
 
 
-@settings(deadline=None)
 @given(TOPICS | st.binary(), st.binary())
 @example(b"hapticd/event", b"\xd6\xff\xff\xff\xff\xff")  # msgpack's own timestamp type
 @example(b"hapticd/event", b"\xdf\xff\xff\xff\xff")  # a map that claims 4 billion entries
@@ -268,7 +267,7 @@ def test_any_bytes_are_records_or_an_error_that_says_so(topic: bytes, payload: b
         assert isinstance(decode(topic, payload), list)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(TOPICS, st.lists(st.dictionaries(KEYS, TREES)) | TREES)
 def test_any_msgpack_is_records_or_an_error_in_one_line(topic: bytes, payload: Any) -> None:
     text, records = "", []

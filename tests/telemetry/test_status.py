@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.telemetry.status import LATE_EDGES_US, LateHistogram, Status
@@ -24,7 +24,6 @@ def test_an_edge_belongs_to_the_bin_above_it() -> None:
     assert histogram.max_us == 1e9
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(-1e6, 1e12)))
 def test_every_tick_is_counted_once(late_us: list[float]) -> None:
     histogram = LateHistogram()

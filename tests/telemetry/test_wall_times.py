@@ -18,7 +18,7 @@ def wall(stiffness_n_per_m: float, *at_s: float) -> WallConfig:
     return WallConfig.model_validate({"stiffness_n_per_m": stiffness_n_per_m, "changes": changes})
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(at_s=TIMES, since=st.integers(0, 10**6))
 def test_it_is_what_the_loops_own_wall_is_at_every_tick(at_s: set[float], since: int) -> None:
     config = wall(12000.0, *at_s)

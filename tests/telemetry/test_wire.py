@@ -9,7 +9,7 @@ from itertools import pairwise, permutations
 from typing import Any
 
 import msgpack
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.contracts.event import Event, EventCode
@@ -80,7 +80,6 @@ def numbers(value: Any) -> list[float]:
     return [one for element in value for one in numbers(element)] if isinstance(value, list) else [value]
 
 
-@settings(deadline=None)
 @given(RECORDS)
 def test_any_record_arrives_as_finite_plain_numbers(record: TickRecord) -> None:
     packer = wire.new_packer()
@@ -92,7 +91,6 @@ def test_any_record_arrives_as_finite_plain_numbers(record: TickRecord) -> None:
                 assert math.isfinite(number), key
 
 
-@settings(deadline=None)
 @given(RECORDS)
 def test_shapes_are_one_element_an_axis_and_one_a_wall(record: TickRecord) -> None:
     maps = all_maps(record)
@@ -104,7 +102,6 @@ def test_shapes_are_one_element_an_axis_and_one_a_wall(record: TickRecord) -> No
         assert not any(isinstance(value, list | tuple) for value in maps.get(topic, {}).values())
 
 
-@settings(deadline=None)
 @given(RECORDS)
 def test_a_map_says_invalid_exactly_when_a_number_was_replaced(record: TickRecord) -> None:
     """And a number that was finite is the same one, however large."""
@@ -195,7 +192,6 @@ def test_a_new_scene_starts_counting_anew() -> None:
     assert told == [[(0, 7)], [], [(0, 1)], [], [(1, 1)], [], [(0, 1)]]
 
 
-@settings(deadline=None)
 @given(
     st.dictionaries(st.text(), FLOATS | st.integers() | st.text() | st.none() | st.lists(FLOATS)),
     st.text(),

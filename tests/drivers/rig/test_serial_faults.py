@@ -173,7 +173,7 @@ def test_a_noisy_line_costs_frames_and_nothing_else(
     driver.close()
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(garbage=st.lists(st.binary(min_size=1, max_size=300), min_size=1, max_size=5))
 def test_whatever_bytes_come_the_next_ticks_answer_is_found(rig: Rig, garbage: list[bytes]) -> None:
     """Bytes that nobody meant, in front of each answer."""
