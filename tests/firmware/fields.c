@@ -71,14 +71,13 @@ static const struct {
 
 #define COUNT(table) (sizeof(table) / sizeof *(table))
 
-static void give_up(const char *what, const char *about)
+static _Noreturn void give_up(const char *what, const char *about)
 {
     fprintf(stderr, "%s: %s\n", what, about);
     exit(1);
 }
 
-/* Bit by bit, as the definition has it. */
-static uint16_t defined_crc(const uint8_t *bytes, unsigned length)
+uint16_t defined_crc(const uint8_t *bytes, unsigned length)
 {
     uint16_t crc = 0xffff;
     for (unsigned i = 0; i < length; i++) {

@@ -11,6 +11,9 @@ struct message {
     uint8_t length;
 };
 
+/* The CRC of docs/rig-protocol.md, bit by bit as its definition has it. */
+uint16_t defined_crc(const uint8_t *bytes, unsigned length);
+
 /* Bytes of a hexadecimal word, "-" for none; returns how many. */
 unsigned unhex(const char *word, uint8_t *bytes, unsigned size);
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fields.h"
 #include "host_rig.h"
 
 enum { SILENCE_US = 20000, MAX_FORCE_UN = 5000000 };
@@ -27,18 +28,6 @@ static void require(bool holds, const char *what)
         fprintf(stderr, "%s\n", what);
         abort();
     }
-}
-
-static uint16_t defined_crc(const uint8_t *bytes, unsigned length)
-{
-    uint16_t crc = 0xffff;
-    for (unsigned i = 0; i < length; i++) {
-        crc = (uint16_t)(crc ^ bytes[i] << 8);
-        for (int bit = 0; bit < 8; bit++) {
-            crc = (uint16_t)(crc & 0x8000 ? crc << 1 ^ 0x1021 : crc << 1);
-        }
-    }
-    return crc;
 }
 
 static bool crc_is_right(const uint8_t *message, unsigned length)

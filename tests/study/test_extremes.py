@@ -421,6 +421,8 @@ def test_the_command_writes_report_picture_and_json_and_replays_a_place(
     assert not (tmp_path / "extremes.journal").exists()
     assert extremes("--point", "1:57") == 0
     assert "spectral radius stepped" in " ".join(capsys.readouterr().out.split())
+    assert extremes("--point", "mass_kg=1") == 0
+    assert "rounding may make of it" in capsys.readouterr().out, "nothing has moved there"
 
 
 @pytest.mark.parametrize("arguments", [("--places", "0"), ("--seed", "-1"), ("--ticks", "-5"), ("--point", "x")])

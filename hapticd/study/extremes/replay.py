@@ -28,6 +28,8 @@ def replay(place: Place) -> list[Line]:
         ("ledger", "wall_rounding", "ledger"),
     ):
         text = f"off by {row[name]:.2g} of what went through; its rounding may reach {row[bound]:.2g}"
+        if row[bound] >= 1.0:
+            text = "less went through than rounding may make of it"
         lines.append(Line(title, text, title not in wrong or bool(wrong[title].explained)))
     lines.append(Line("run", _run(row), "range" not in wrong and "not a number" not in wrong))
     if not math.isnan(row["law_break"]):
