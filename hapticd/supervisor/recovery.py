@@ -109,9 +109,13 @@ class Recovery:
         return control
 
     def amend(self, before: Predecessor) -> None:
-        """Change what the next control process goes on from, also when it is already on its way."""
-        self.before = before
-        self.stop()
+        """Change what the next control process goes on from, also when it is already on its way.
+
+        What changes nothing costs no try: who says `clear` again and again would keep the device away.
+        """
+        if before != self.before:
+            self.before = before
+            self.stop()
 
     def stop(self) -> None:
         """Stop looking."""
