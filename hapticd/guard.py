@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hapticd.config.models import SafetyConfig
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 
 DEFAULT_MAX_SPEED_M_PER_S = 2.0

@@ -17,8 +17,9 @@ from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
 
 from hapticd import registry
+from hapticd.contracts.device import FoundDevice
 from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.driver import DriverOptions, FoundDevice
+from hapticd.contracts.driver import DriverOptions
 from hapticd.contracts.errors import HapticdError
 
 T = TypeVar("T")

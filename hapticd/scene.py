@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 
 from hapticd.config.models import WallConfig
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 
 

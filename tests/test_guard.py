@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticd.config.models import SafetyConfig
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, blended, start_blend
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from hapticd import lookup, registry
+from hapticd.contracts.device import FoundDevice
 from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.driver import FoundDevice
 from hapticd.lookup import Lookup
 from hapticd.simulation.options import SimulationOptions
 from tests.drivers.plugin import install

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticd.config.models import SceneConfig, WallConfig
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.scene import Wall, compile_walls
 

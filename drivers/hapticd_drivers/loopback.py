@@ -6,8 +6,10 @@ import math
 import time
 from collections.abc import Sequence
 
-from hapticd.contracts.driver import DeviceInfo, Driver, FoundDevice, Sample
+from hapticd.contracts.device import DeviceInfo, FoundDevice
+from hapticd.contracts.driver import Driver
 from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError
+from hapticd.contracts.sample import Sample
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
 

@@ -24,7 +24,7 @@ import msgpack
 import zmq
 
 from hapticd.config.models import TelemetryConfig
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.record import Flag, TickRecord, WallRecord
 from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.status import Status

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticd.config.models import LoopConfig, SafetyConfig
-from hapticd.contracts.driver import Driver, DriverState, Sample
+from hapticd.contracts.driver import Driver, DriverState
 from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.contracts.record import Flag
+from hapticd.contracts.sample import Sample
 from hapticd.control.letters import Letters
 from hapticd.control.predecessor import NOBODY, Predecessor
 from hapticd.control.shared import (

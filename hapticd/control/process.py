@@ -25,9 +25,10 @@ import msgpack
 from hapticd import registry
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import MAX_WALLS
-from hapticd.contracts.driver import DeviceInfo, Sample
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
 from hapticd.contracts.record import RecordLayout
+from hapticd.contracts.sample import Sample
 from hapticd.control.contact import RunningLaw
 from hapticd.control.loop import ControlLoop
 from hapticd.control.predecessor import Predecessor, identity

@@ -9,10 +9,11 @@ import math
 from collections.abc import Callable, Iterable
 
 from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
-from hapticd.contracts.driver import DeviceInfo, Sample
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.event import EventCode
 from hapticd.contracts.record import Flag
+from hapticd.contracts.sample import Sample
 from hapticd.control import fallback
 from hapticd.control.contact import Contact, RunningLaw
 from hapticd.energy import EnergyLedger

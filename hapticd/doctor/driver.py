@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 
 from hapticd import registry
-from hapticd.contracts.driver import Driver, FoundDevice
+from hapticd.contracts.device import FoundDevice
+from hapticd.contracts.driver import Driver
 from hapticd.doctor.finding import Finding, ok, own_command, problem, unknown
 from hapticd.lookup import Lookup
 

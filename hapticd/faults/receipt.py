@@ -9,7 +9,7 @@ from typing import Any
 
 import hapticd
 from hapticd.config.loading import LoadedConfig
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.event import Event, EventCode
 
 

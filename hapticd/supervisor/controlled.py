@@ -11,7 +11,7 @@ from typing import Any
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.models import MAX_WALLS
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.record import RecordLayout
 from hapticd.control.shared import RECORDS, SKIPPED, SUPERVISOR_BEAT, EventReader, RecordReader, SharedMemory
 

@@ -21,7 +21,7 @@ from hapticd.telemetry.wire import timestamp_s
 if TYPE_CHECKING:
     from hapticd.config.loading import LoadedConfig
     from hapticd.config.models import SafetyConfig
-    from hapticd.contracts.driver import DeviceInfo
+    from hapticd.contracts.device import DeviceInfo
     from hapticd.control.predecessor import Predecessor
     from hapticd.supervisor.controlled import Control
     from hapticd.supervisor.recovery import Recovery

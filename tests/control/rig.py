@@ -9,9 +9,10 @@ from types import ModuleType
 from typing import Any
 
 from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
-from hapticd.contracts.driver import DeviceInfo, Sample
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.law import LawParams
 from hapticd.contracts.record import RecordLayout
+from hapticd.contracts.sample import Sample
 from hapticd.control.contact import RunningLaw
 from hapticd.control.tick import ControlTick
 from hapticd.guard import Guard

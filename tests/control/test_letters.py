@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from hapticd.config.loading import LoadedConfig, parse
-from hapticd.contracts.driver import Sample
 from hapticd.contracts.event import EventCode
+from hapticd.contracts.sample import Sample
 from hapticd.supervisor.reload import switch_letter
 from tests.control.bench import PERIOD_S, Bench
 

@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 import pytest
 
 from hapticd.config.loading import parse
-from hapticd.contracts.driver import DeviceInfo, Driver, DriverOptions, Sample
+from hapticd.contracts.device import DeviceInfo
+from hapticd.contracts.driver import Driver, DriverOptions
 from hapticd.contracts.event import EventCode
 from hapticd.contracts.record import RecordLayout
+from hapticd.contracts.sample import Sample
 from hapticd.control.loop import ControlLoop
 from hapticd.control.process import make_tick
 from hapticd.control.shared import DISARM, DONE, MAIL, SUPERVISOR_BEAT, EventReader, SharedMemory

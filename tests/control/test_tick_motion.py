@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from hapticd.config.models import VelocityConfig
-from hapticd.contracts.driver import Sample
 from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.event import EventCode
+from hapticd.contracts.sample import Sample
 from hapticd.control.tick import FROZEN_TICKS
 from tests.control.rig import PERIOD_S, Rig, wall
 from tests.control.transitions import pressed

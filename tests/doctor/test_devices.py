@@ -8,7 +8,8 @@ import pytest
 
 from hapticd import lookup, registry
 from hapticd.config.models import LoopConfig
-from hapticd.contracts.driver import Driver, DriverOptions, FoundDevice
+from hapticd.contracts.device import FoundDevice
+from hapticd.contracts.driver import Driver, DriverOptions
 from hapticd.doctor import driver, endpoints, rules, usb
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.examination import Examination

@@ -17,7 +17,7 @@ def install(directory: Path, monkeypatch: pytest.MonkeyPatch, *methods: str, nam
     lines = [
         "import ctypes, os, time",
         "from hapticd.contracts.diagnosis import Diagnosis",
-        "from hapticd.contracts.driver import FoundDevice",
+        "from hapticd.contracts.device import FoundDevice",
         "from hapticd.contracts.errors import DriverError",
         "from hapticd_drivers.loopback import Loopback",
         "class Driver(Loopback):",

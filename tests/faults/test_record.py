@@ -15,7 +15,7 @@ import pytest
 
 from hapticd.cli import main
 from hapticd.config.loading import parse
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError, HapticdError
 from hapticd.contracts.event import Event, EventCode
 from hapticd.contracts.record import RecordLayout

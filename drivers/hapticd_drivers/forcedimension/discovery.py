@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hapticd.contracts.driver import FoundDevice
+from hapticd.contracts.device import FoundDevice
 from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, DriverError, PluginError
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.models import FALCON_TYPE, MODELS

@@ -10,10 +10,12 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 
+from hapticd.contracts.device import DeviceInfo, FoundDevice
 from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.driver import DeviceInfo, Driver, DriverState, FoundDevice, Sample
+from hapticd.contracts.driver import Driver, DriverState
 from hapticd.contracts.errors import ConfigError, DeviceFaultError, DriverStateError
 from hapticd.contracts.metric import Metric
+from hapticd.contracts.sample import Sample
 from hapticd_drivers.forcedimension import diagnosis, discovery, presence, settings
 from hapticd_drivers.forcedimension.failures import TIMEOUT, cause_of
 from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ

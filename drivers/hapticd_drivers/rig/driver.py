@@ -8,7 +8,8 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, TypeVar
 
-from hapticd.contracts.driver import DeviceInfo, Driver, DriverState, Sample
+from hapticd.contracts.device import DeviceInfo
+from hapticd.contracts.driver import Driver, DriverState
 from hapticd.contracts.errors import (
     ConfigError,
     DeviceFaultError,
@@ -17,6 +18,7 @@ from hapticd.contracts.errors import (
     DriverError,
     DriverStateError,
 )
+from hapticd.contracts.sample import Sample
 from hapticd_drivers.rig import messages, motion
 from hapticd_drivers.rig.conversation import Conversation
 from hapticd_drivers.rig.link import Link

@@ -14,8 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from hapticd.contracts.device import FoundDevice
 from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.driver import FoundDevice
 from hapticd.contracts.errors import (
     DeviceBusyError,
     DeviceDisconnectedError,

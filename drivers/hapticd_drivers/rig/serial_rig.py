@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from hapticd.contracts.driver import FoundDevice
+from hapticd.contracts.device import FoundDevice
 from hapticd.contracts.errors import ConfigError
 from hapticd_drivers.rig import serial_ports
 from hapticd_drivers.rig.driver import RigDriver

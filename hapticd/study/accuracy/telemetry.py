@@ -11,7 +11,7 @@ from pathlib import Path
 import zmq
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.contracts.driver import DeviceInfo
+from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.record import TickRecord, WallRecord
 from hapticd.telemetry.publisher import BATCH_NS, Publisher
 
