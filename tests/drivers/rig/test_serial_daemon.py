@@ -5,11 +5,10 @@ Protocol and safety are shown here, latency is not: a millisecond of the rig is 
 
 from __future__ import annotations
 
-import itertools
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import msgpack
@@ -122,15 +121,18 @@ class Lab:
                 return False
             time.sleep(0.01)
 
-    def held(self, positions: Iterator[float]) -> bool:
+    def held(self) -> bool:
         """Whether the handle comes to rest, for half a second, where hand and wall are in balance."""
         depth_m = PRESS_N / STIFFNESS_N_PER_M
+        end_s = time.monotonic() + 10.0
         still = 0
-        for position_m in itertools.islice(positions, 10_000):
-            still = still + 1 if abs(position_m - (WALL_M - depth_m)) < 0.1 * depth_m else 0
-            if still == 500:
-                return True
-        return False
+        with Subscriber(self.daemon.endpoint, "hapticd/position") as subscriber:  # it hears of now and not of before
+            for _, fields in subscriber.maps():
+                off_m = abs(fields["position_m"][0] - (WALL_M - depth_m))
+                still = still + 1 if off_m < 0.1 * depth_m else 0
+                if still == 500 or time.monotonic() > end_s:
+                    break
+        return still == 500
 
 
 def until(subscriber: Subscriber, *texts: str) -> None:
@@ -174,19 +176,17 @@ def on_a_board(place_m: float, homing: str = "here") -> Callable[[Callable[[Lab]
 @on_a_board(-0.04, "low_switch")
 def test_a_rig_is_identified_homed_enabled_and_holds_a_wall(lab: Lab) -> None:
     """Its handle stands near the home switch, which is at the lower end."""
-    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status", "hapticd/position") as subscriber:
+    with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
         status = subscriber.until("hapticd/status")
         assert (status["device"], status["serial"], status["armed"]) == ("serial-rig", "0001", False)
         assert not status["calibrated"]
         assert any("no low-latency mode" in warning for warning in status["warnings"])
         assert "hapticd calibrate" in lab.ask("arm")
 
-        positions = (fields["position_m"][0] for topic, fields in subscriber.maps() if topic == "hapticd/position")
-        assert any(lab.press().held(positions) for _ in range(ATTEMPTS))
+        assert any(lab.press().held() for _ in range(ATTEMPTS))
         assert lab.board.state().position_m == pytest.approx(WALL_M - PRESS_N / STIFFNESS_N_PER_M, abs=3e-4)
         assert lab.board.state().motor_n == pytest.approx(PRESS_N, rel=0.2)
-        status = subscriber.until("hapticd/status")
-        assert status["calibrated"]
+        status = subscriber.until("hapticd/status", calibrated=True)
         metrics = status["device_metrics"]
         assert 0.0 < metrics["echo_us"] <= metrics["longest_echo_us"]
         assert metrics["round_trip_us"] > 0.0
