@@ -100,6 +100,7 @@ def test_there_and_back_again_is_the_same_file() -> None:
         ("controller = 3\n", "none", {}, "controller = 3"),
         ("[controller]\nparams = 3\n", "none", {}, r"controller\.params = 3"),
         ("[[controller]]\n", "none", {}, "controller"),
+        ("controller.params.window = 2\n[controller.params.deeper]\n", "none", {}, "only a person can edit"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_name(text: str, law: str, params: dict[str, Any], named: str) -> None:
