@@ -261,6 +261,14 @@ def test_beyond_the_grid_every_run_balances_or_is_refused_by_a_limit(place: Plac
     assert [one for one in findings(place, row_of(place)) if not one.explained] == []
 
 
+def test_a_sensor_whose_step_is_a_leap_may_end_a_run_within_range() -> None:
+    """Half a step on, the reading is a metre on, in a microsecond."""
+    place = place_of("rate_hz=1e6,resolution_m=1.0,initial_position_m=0.5,initial_velocity_m_per_s=1.0")
+    row = row_of(place)
+    assert row["left_range"] == 1.0
+    assert findings(place, row) == []
+
+
 def test_the_edge_of_a_verdict_is_found_to_the_last_digits_and_what_lies_on_it_is_explained() -> None:
     """At the edge itself rounding decides; the exact radius must then be closer to it than rounding moves it."""
     place = Place(mass_kg=0.25, viscous_n_s_per_m=4.0, force_delay_samples=1)

@@ -48,6 +48,7 @@ GIVEN = (
     "start_m",
     "start_m_per_s",
     "start_measured_m",
+    "step_m",
     "brakes_vv",
     "brakes_va",
     "brakes_aa",
@@ -106,6 +107,7 @@ def run_of(place: Place, ticks: int, finite: bool) -> dict[str, float]:
         "start_m": place.initial_position_m,
         "start_m_per_s": place.initial_velocity_m_per_s,
         "start_measured_m": first_m,
+        "step_m": step_m,
         "brakes_vv": brakes[0],
         "brakes_va": brakes[1],
         "brakes_aa": brakes[2],
@@ -200,10 +202,11 @@ def balance(trace: Any, run: Any, books: Any) -> None:
     books[12] = ROUNDING * (16.0 * wall_slips + ticks * wall_turnover) + 64.0 * ticks * TINIEST
     books[6] = ROUNDING * (run.amplifies * (slips + wall_slips) + ticks * books[5]) + 64.0 * ticks * TINIEST
     books[13] = 1.0 if finite else 0.0
-    # Where a run has been stopped, the next step of the analytic solution must be out of range.
+    # Where a run has been stopped, the next step of the analytic solution must be out of range, as the sensor reads it.
     push = pull / m
     far_x = x + run.swing * v + run.area * push
-    far = abs(far_x) >= 0.999 * FARTHEST_M or abs(far_x - measured) >= 0.999 * MOST_M_PER_S * run.period_s
+    off = 0.5 * run.step_m
+    far = abs(far_x) + off >= 0.999 * FARTHEST_M or abs(far_x - measured) + off >= 0.999 * MOST_M_PER_S * run.period_s
     books[14] = 1.0 if far else 0.0
 
 
