@@ -21,7 +21,7 @@ help:
 	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
 	@echo "make test     everything that CI checks"
 	@echo "make lint     formatting, style, types and import rules only"
-	@echo "make nightly  the long runs over every shipped configuration"
+	@echo "make nightly  the long runs: every shipped configuration, every property on many examples"
 	@echo "make bench    how long a tick takes on this machine"
 	@echo "make install  the daemon as a system service (as root); PREFIX=$(PREFIX), DESTDIR for packages"
 	@echo "make uninstall  all of that away again, except configurations and fault records"
@@ -42,6 +42,7 @@ lint: $(READY)
 
 nightly: packages $(READY)
 	$(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
+	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
 
 bench: $(READY)
 	$(BIN)/hapticd bench

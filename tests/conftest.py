@@ -9,10 +9,13 @@ from collections.abc import Generator
 import pytest
 from hypothesis import settings
 
+from tests.examples import TIMES, examples
+
 IN_CI = os.environ.get("CI") == "true"
 
-# On a busy machine any example may be slow. The rest stays Hypothesis's own: in CI the same examples every time.
-settings.register_profile("unhurried", deadline=None)
+# On a busy machine any example may be slow. The rest stays Hypothesis's own: in CI the same examples every time, but
+# others each night in the nightly run, which has many.
+settings.register_profile("unhurried", examples(100), deadline=None, derandomize=IN_CI and TIMES == 1)
 settings.load_profile("unhurried")
 
 

@@ -66,7 +66,7 @@ def test_a_skipped_test_is_a_failure_in_ci_only(tmp_path: Path, ci: str, status:
     shutil.copy(ROOT / "tests" / "conftest.py", tmp_path)
     (tmp_path / "test_a.py").write_text("import pytest\n\ndef test_it():\n    pytest.skip('no compiler')\n")
     (tmp_path / "test_b.py").write_text("import pytest\n\npytest.importorskip('no_such_module')\n")
-    done = run(sys.executable, "-m", "pytest", "-rA", tmp_path, cwd=tmp_path, CI=ci)
+    done = run(sys.executable, "-m", "pytest", "-rA", tmp_path, cwd=tmp_path, CI=ci, PYTHONPATH=str(ROOT))
     assert (done.returncode != 0) == bool(status), done.stdout
     assert done.stdout.count("skipped in CI") >= 2 * status
 

@@ -7,12 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.energy import EnergyLedger, cycle_ended
-
-REPEATABLE = settings(derandomize=True)
 
 # Few levels, so that equal samples, falls and rises of every length come up.
 LEVELS = st.lists(st.tuples(st.integers(-3, 3).map(float), st.sampled_from([True, True, True, False])), max_size=80)
@@ -55,7 +53,6 @@ def literal_cycles(samples: list[tuple[float, bool]], past: int, future: int) ->
     return found
 
 
-@REPEATABLE
 @given(samples=LEVELS, past=st.integers(1, 4), future=st.integers(1, 4))
 def test_the_detector_finds_what_a_literal_reading_of_the_window_finds(
     samples: list[tuple[float, bool]], past: int, future: int
@@ -145,7 +142,6 @@ class Spring:
 DEPTHS_M = st.lists(st.floats(-5e-3, 2e-3), max_size=60)
 
 
-@REPEATABLE
 @given(
     depths_m=DEPTHS_M,
     extras_n=st.lists(st.floats(-20.0, 20.0), min_size=60, max_size=60),
@@ -169,7 +165,6 @@ def test_energy_is_stored_plus_dissipated_minus_generated_whatever_happens(
         generated_j = ledger.generated_j
 
 
-@REPEATABLE
 @given(depths_m=st.lists(st.floats(-5e-3, -1e-9), min_size=1, max_size=60))
 def test_a_held_spring_generates_half_k_dx_squared_at_every_step(depths_m: list[float]) -> None:
     """From the first touch on: a step in from outside makes k/2 times what of it is inside."""
@@ -184,7 +179,6 @@ def test_a_held_spring_generates_half_k_dx_squared_at_every_step(depths_m: list[
         assert world.ledger.dissipated_j == pytest.approx(0.0, abs=1e-12)
 
 
-@REPEATABLE
 @given(depths_m=DEPTHS_M, limit_n=st.sampled_from([5.0, math.inf]))
 def test_a_spring_alone_dissipates_nothing_also_where_the_limit_flattens_it(
     depths_m: list[float], limit_n: float

@@ -8,15 +8,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import SafetyConfig
 from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, blended, start_blend
-
-REPEATABLE = settings(derandomize=True)
 
 PERIOD_S = 1e-3
 FORCES = st.lists(st.floats(-1e18, 1e18), min_size=1, max_size=3)
@@ -45,7 +43,6 @@ def test_nothing_passes_until_it_is_armed() -> None:
     assert force_n == [0.0, 0.0, 0.0]
 
 
-@REPEATABLE
 @given(force_n=FORCES, max_axis_n=st.none() | st.floats(0.1, 12.0))
 def test_no_force_is_beyond_a_limit_and_its_direction_is_kept(force_n: list[float], max_axis_n: float | None) -> None:
     made = armed(max_axis_force_n=max_axis_n)
@@ -57,7 +54,6 @@ def test_no_force_is_beyond_a_limit_and_its_direction_is_kept(force_n: list[floa
     assert made.limited == (share < 1.0)
 
 
-@REPEATABLE
 @given(force_n=st.lists(st.floats(-6.0, 6.0), min_size=1, max_size=3))
 def test_a_force_within_limits_is_not_touched(force_n: list[float]) -> None:
     made = armed()
@@ -223,7 +219,6 @@ def test_limits_that_return_from_simulation_start_from_the_force_in_use() -> Non
 BLEND_FORCES = st.floats(-1e6, 1e6)
 
 
-@REPEATABLE
 @given(
     from_n=st.floats(-12.0, 12.0),
     from_x_m=st.floats(-0.02, -1e-6),

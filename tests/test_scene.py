@@ -6,15 +6,13 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import SceneConfig, WallConfig
 from hapticd.contracts.device import DeviceInfo
 from hapticd.contracts.errors import ConfigError
 from hapticd.scene import Wall, compile_walls
-
-REPEATABLE = settings(derandomize=True)
 
 
 def wall(stiffness_n_per_m: float = 1000.0, period_s: float = 1e-3, **keys: Any) -> Wall:
@@ -43,7 +41,6 @@ def test_the_springs_part_of_the_force_is_known_apart() -> None:
     assert damped.spring_n == 2.0
 
 
-@REPEATABLE
 @given(x_m=st.floats(-0.1, 0.1), stiffness=st.floats(0.0, 1e5), limit_n=st.floats(1e-3, 100.0) | st.just(math.inf))
 def test_stored_energy_is_the_work_of_pressing_slowly_against_the_limited_spring(
     x_m: float, stiffness: float, limit_n: float

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import VelocityConfig
 from hapticd.velocity import AdaptiveWindow, Difference, Estimator, LongDifference, LowPass, make_estimator
-
-REPEATABLE = settings(derandomize=True)
 
 STEPS_S = st.lists(st.floats(1e-5, 0.5), min_size=1, max_size=200)
 ALL = [
@@ -53,7 +51,6 @@ def test_after_a_start_the_past_is_forgotten(config: VelocityConfig) -> None:
     assert made.update(-4.0, 1e-3, 0.0) == 0.0
 
 
-@REPEATABLE
 @given(steps_s=STEPS_S, speed=st.floats(-2.0, 2.0), samples=st.integers(1, 64))
 def test_a_straight_motion_is_seen_exactly_whatever_the_sampling(
     steps_s: list[float], speed: float, samples: int
@@ -87,7 +84,6 @@ def test_the_long_difference_stays_exact_over_hours() -> None:
         assert velocity == pytest.approx(0.05, rel=1e-12)
 
 
-@REPEATABLE
 @given(steps_s=STEPS_S)
 def test_the_low_pass_answers_a_step_of_velocity_as_the_continuous_one_does(steps_s: list[float]) -> None:
     """v(t) = 1 - exp(-w t) at every sample, however far apart: exact for a step."""
@@ -114,7 +110,6 @@ def longest_fit(track: list[tuple[float, float]], samples: int, noise_m: float) 
     return velocity
 
 
-@REPEATABLE
 @given(
     moves=st.lists(st.tuples(st.integers(-3, 3), st.sampled_from([1, 1, 1, 2])), min_size=1, max_size=60),
     samples=st.integers(1, 20),

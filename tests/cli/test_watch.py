@@ -22,7 +22,7 @@ from typing import Any
 
 import pyte
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.bench.telemetry import synthetic_records
@@ -32,6 +32,7 @@ from hapticd.cli.trace import SLICE_S, Trace, axis, bars, plot
 from hapticd.client import Cycle, Damping, Energy, Event, Position, Status
 from hapticd.contracts import event as contract
 from hapticd.telemetry.status import LateHistogram
+from tests.examples import examples
 from tests.telemetry.sockets import PATIENCE_S, Wire
 
 HAPTICD = str(Path(sys.executable).with_name("hapticd"))
@@ -323,7 +324,7 @@ def test_json_is_a_line_a_status(feed: Feed) -> None:
 NUMBERS = st.floats(-1e300, 1e300) | st.floats(-1.0, 1.0)
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(
     width=st.integers(1, 200),
     height=st.integers(1, 60),

@@ -7,12 +7,13 @@ import tomllib
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.editing import with_law
 from hapticd.contracts.errors import ConfigError
 from hapticd.share import directory
+from tests.examples import examples
 
 REFERENCE = (directory("config") / "hapticd.toml").read_text()
 
@@ -133,7 +134,7 @@ TOML_LINES = st.sampled_from(
 )
 
 
-@settings(derandomize=True, max_examples=300)
+@examples(300)
 @given(lines=st.lists(TOML_LINES, max_size=12), law=st.sampled_from(["none", "tdpa", "energy-cycle"]))
 def test_whatever_the_file_says_it_is_edited_rightly_or_refused(lines: list[str], law: str) -> None:
     text = "\n".join(lines)

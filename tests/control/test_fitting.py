@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.cli import main
@@ -16,6 +16,7 @@ from hapticd.contracts.errors import ConfigError
 from hapticd.control.fitting import fit, fitted, track
 from hapticd.simulation.omission import OMISSIONS, omissions, without
 from hapticd.simulation.options import SimulationOptions
+from tests.examples import examples
 
 FULL = """
 [device.options]
@@ -153,7 +154,7 @@ def test_check_says_which_model_and_why(tmp_path: Path, capsys: pytest.CaptureFi
     assert json.loads(capsys.readouterr().out)[0]["accuracy"].startswith("exact step without")
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     keys=st.fixed_dictionaries(
         {

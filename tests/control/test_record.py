@@ -6,13 +6,11 @@ import struct
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import MAX_WALLS
 from hapticd.contracts.record import Flag, RecordLayout, TickRecord, WallRecord
-
-REPEATABLE = settings(derandomize=True)
 
 WHOLE = st.integers(-(2**63), 2**63 - 1)
 REAL = st.floats(allow_nan=False)
@@ -52,7 +50,6 @@ def values(record: TickRecord) -> list[Any]:
     return [*scalars, len(record.walls), *flat]
 
 
-@REPEATABLE
 @given(packed=records())
 def test_what_is_packed_is_what_is_unpacked(packed: tuple[RecordLayout, TickRecord]) -> None:
     """Also over a slot that held another record before, with more walls."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import SafetyConfig
@@ -18,6 +18,7 @@ from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
 from hapticd_controllers import energy_cycle, none, tdpa
 from tests.control.rig import LIMIT_N, PERIOD_S, RAMP_TICKS, Rig, scene, wall
+from tests.examples import examples
 
 LAWS: dict[str, tuple[Any, LawParams]] = {
     "none": (none, none.Params()),
@@ -98,7 +99,7 @@ def clipped(force_n: float, limit_n: float) -> float:
     return max(-limit_n, min(limit_n, force_n))
 
 
-@settings(derandomize=True, max_examples=150)
+@examples(150)
 @given(path=st.lists(SWITCHES, min_size=1, max_size=12))
 def test_whatever_is_switched_to_whatever_the_force_is_bounded_and_goes_by_ramps(
     path: list[tuple[str | None, str | None, str | None, int]],
@@ -137,7 +138,7 @@ def test_whatever_is_switched_to_whatever_the_force_is_bounded_and_goes_by_ramps
                     assert abs(contact.force_n - was[1]) <= step_bound_n(contact, *was[1:]) + 1e-9
 
 
-@settings(derandomize=True, max_examples=60)
+@examples(60)
 @given(path=st.lists(SWITCHES, min_size=1, max_size=8))
 def test_a_debt_is_carried_through_every_switch(
     path: list[tuple[str | None, str | None, str | None, int]],

@@ -15,7 +15,7 @@ from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
 from hapticd_controllers import energy_cycle, none, tdpa
 from tests.control.rig import LIMIT_N, PERIOD_S, Rig, running, wall
-from tests.control.transitions import REPEATABLE, pressed
+from tests.control.transitions import pressed
 
 # What the guard leaves alone
 
@@ -93,7 +93,6 @@ def test_a_slot_between_two_facing_walls_pushes_to_its_middle() -> None:
     assert rig.force(0.0) == 0.0
 
 
-@REPEATABLE
 @given(
     depths_m=st.lists(st.floats(-0.02, 0.01), min_size=3, max_size=3),
     stiffnesses=st.lists(st.floats(0.0, 20000.0), min_size=4, max_size=4),

@@ -6,14 +6,15 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import SafetyConfig
 from hapticd.contracts.errors import ConfigError
 from hapticd.guard import Guard
 from tests.control.rig import Rig, device, law, returns, running, scene, wall
-from tests.control.transitions import DEEDS, MOVES, REPEATABLE, TRANSITIONS, pressed
+from tests.control.transitions import DEEDS, MOVES, TRANSITIONS, pressed
+from tests.examples import examples
 
 
 @pytest.mark.parametrize("new", [scene(), scene(wall(500.0, position_m=1e-3))])
@@ -31,7 +32,7 @@ def test_the_sum_of_all_books_does_not_jump_when_walls_go(new: Any) -> None:
     assert rig.tick.past.energy_j != 0.0
 
 
-@settings(REPEATABLE, max_examples=100)
+@examples(100)
 @given(path=st.lists(st.tuples(DEEDS, st.integers(1, 15), MOVES), min_size=1, max_size=20))
 def test_the_books_are_the_work_of_the_written_force_through_every_transition(
     path: list[tuple[str, int, float]],

@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import VelocityConfig
@@ -16,7 +16,8 @@ from hapticd.contracts.event import EventCode
 from hapticd.guard import Mode
 from hapticd_controllers import energy_cycle, none, tdpa
 from tests.control.rig import LIMIT_N, RAMP_TICKS, Rig, largest_step, wall
-from tests.control.transitions import REPEATABLE, TRANSITIONS, pressed
+from tests.control.transitions import TRANSITIONS, pressed
+from tests.examples import examples
 
 
 def anything() -> st.SearchStrategy[float]:
@@ -52,7 +53,7 @@ VELOCITIES = [
 ]
 
 
-@settings(REPEATABLE, max_examples=100)
+@examples(100)
 @given(
     stream=streams(),
     velocity=st.sampled_from(VELOCITIES),

@@ -6,7 +6,7 @@ import itertools
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import SafetyConfig
@@ -22,11 +22,11 @@ from tests.control.transitions import (
     FASTER_TICKS,
     MOVES,
     RAMP_STEP_N,
-    REPEATABLE,
     TRANSITIONS,
     arm_again,
     pressed,
 )
+from tests.examples import examples
 
 
 @pytest.mark.parametrize("name", TRANSITIONS)
@@ -147,7 +147,7 @@ def test_a_blend_ends_with_the_contact_and_never_pulls_the_hand_in() -> None:
     assert rig.force(-1e-3) == 2.0
 
 
-@settings(REPEATABLE, max_examples=400)
+@examples(400)
 @given(path=st.lists(st.tuples(DEEDS, st.integers(1, 15), MOVES), min_size=1, max_size=25))
 def test_whatever_is_asked_in_whatever_order_the_force_goes_by_ramps(path: list[tuple[str, int, float]]) -> None:
     """Motion explains k dx for each wall, and a blind moment a tenth of the limit; the rest is ramps.

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hypothesis import settings
 from hypothesis import strategies as st
 
 from hapticd.config.models import SafetyConfig
 from hapticd.contracts.event import EventCode
 from hapticd.guard import BLIND_RAMP_S
 from tests.control.rig import LIMIT_N, PERIOD_S, RAMP_TICKS, Rig, pushes, running, scene, wall
-
-REPEATABLE = settings(derandomize=True)
 
 RAMP_STEP_N = LIMIT_N / RAMP_TICKS
 BLIND_TICKS = round(BLIND_RAMP_S / PERIOD_S)

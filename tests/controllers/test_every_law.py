@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.contracts.law import (
@@ -27,6 +27,7 @@ from hapticd.contracts.law import (
     scalar_params,
 )
 from hapticd_controllers import energy_cycle, none, tdpa
+from tests.examples import examples
 
 from . import machine
 from .plant import Device, Rig
@@ -129,7 +130,7 @@ def hostile_ticks(draw: st.DrawFn) -> list[LawTick]:
 
 @each_law
 @given(ticks=hostile_ticks(), data=st.data())
-@settings(max_examples=150)
+@examples(150)
 def test_finite_ticks_give_a_finite_force_and_a_state_of_numbers(
     law: ModuleType, ticks: list[LawTick], data: st.DataObject
 ) -> None:

@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 import pytest
 import serial
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.frames import FrameReader, framed
+from tests.examples import examples
 from tests.firmware.board import Board, Built, Pace
 from tests.firmware.talk import Talk
 
@@ -207,7 +208,7 @@ def test_an_unplugged_rig_is_without_force_and_comes_back_as_just_switched_on(bo
         assert refused.reason == messages.NO_HELLO
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(garbage=st.binary(max_size=300))
 def test_after_any_garbage_the_second_frame_is_understood(board: Board, garbage: bytes) -> None:
     board.unplug()

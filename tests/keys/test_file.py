@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 import zmq.auth
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hapticd.contracts.errors import ConfigError
 from hapticd.keys.file import Key, KeyWriteError, is_key, new_pair, read, write
+from tests.examples import examples
 
 
 def test_zeromqs_own_tools_read_ours_and_we_theirs(tmp_path: Path) -> None:
@@ -26,7 +27,7 @@ def test_zeromqs_own_tools_read_ours_and_we_theirs(tmp_path: Path) -> None:
     assert zmq.curve_public(theirs.secret.encode()).decode() == theirs.public
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.booleans(), st.booleans(), st.booleans())
 def test_what_is_written_is_what_is_read(
     tmp_path_factory: pytest.TempPathFactory, secret: bool, server: bool, watch_only: bool
@@ -102,7 +103,7 @@ LINES = st.lists(
 ).map(lambda lines: "\n".join(f'    {name} = "{value}"' for name, value in lines).encode())
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(st.binary(max_size=300) | LINES)
 @example(b"public-key")
 @example(b"public-key =")

@@ -14,13 +14,14 @@ from urllib.parse import urlsplit
 import msgpack
 import pytest
 import zmq
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.contracts.errors import InstanceError
 from hapticd.keys import gate
 from hapticd.keys.file import Key, new_pair
 from hapticd.supervisor.commands import CommandSocket
+from tests.examples import examples
 from tests.keys.endpoints import Endpoints, ring_of
 from tests.telemetry.sockets import PATIENCE_S, ticks
 
@@ -213,7 +214,7 @@ def test_garbage_at_either_port_disturbs_nobody_and_leaves_no_file_handle() -> N
         endpoints.turn_until(lambda: laptop.received() > 0, "the status")
         before = open_files()
 
-        @settings(max_examples=100)
+        @examples(100)
         @given(st.sampled_from([endpoints.telemetry, endpoints.control]), BEGINNINGS, st.binary(max_size=300))
         def throw(endpoint: str, beginning: bytes, rest: bytes) -> None:
             address = urlsplit(endpoint)
@@ -242,7 +243,7 @@ def test_whoever_says_nothing_is_disconnected(monkeypatch: pytest.MonkeyPatch) -
                     pass
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(st.lists(st.binary(max_size=200), min_size=1, max_size=4))
 def test_whatever_a_listed_client_sends_is_answered(frames: list[bytes]) -> None:
     with served() as endpoints:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -20,6 +20,7 @@ from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.batch.kernel import FARTHEST_M
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
+from tests.examples import examples
 
 
 def decades(low: float, high: float) -> st.SearchStrategy[float]:
@@ -63,7 +64,7 @@ OPTIONS = st.fixed_dictionaries(
 )
 
 
-@settings(derandomize=True, max_examples=400)
+@examples(400)
 @given(keys=OPTIONS, period_s=decades(-6, 1), force_n=st.floats(-1e6, 1e6))
 def test_a_device_gives_numbers_or_names_the_option_that_goes_too_far(
     keys: dict[str, Any], period_s: float, force_n: float

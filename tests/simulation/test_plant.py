@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
 from hapticd.simulation.plant import flow, sine, terms
+from tests.examples import examples
 from tests.simulation import exact
 
 T = 1e-3
@@ -419,7 +420,7 @@ anything = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(keys=anything, period=st.floats(1e-4, 1e-2), forces=st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30))
 def test_finite_goes_in_and_finite_comes_out(keys: dict[str, Any], period: float, forces: list[float]) -> None:
     try:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.cli import main
@@ -30,6 +30,7 @@ from hapticd.study.accuracy.telemetry import measure_batches
 from hapticd.study.accuracy.traps import traps
 from hapticd.study.played import play
 from hapticd.study.verdict import Criterion
+from tests.examples import examples
 from tests.simulation import exact
 
 T = 1e-3
@@ -159,7 +160,7 @@ def test_at_contact_events_pay_only_where_the_tolerance_is_tight() -> None:
     assert math.log10(fourth[1] / fourth[2]) < 2.5
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     mass=st.floats(0.05, 2.0),
     damping=st.floats(0.0, 5.0),

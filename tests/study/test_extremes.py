@@ -12,7 +12,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd import registry
@@ -31,8 +31,7 @@ from hapticd.study.extremes.refusals import is_due
 from hapticd.study.extremes.sweep import COLUMNS, Plan, judge, rows_of
 from hapticd.study.extremes.verdict import MARGIN, Verdict, verdict_of
 from hapticd.study.verdict import Criterion
-
-REPEATABLE = settings(derandomize=True)
+from tests.examples import examples
 
 
 def row_of(place: Place) -> dict[str, float]:
@@ -150,7 +149,7 @@ def radius_of_companion(place: Place) -> Any:
         return max(abs(value) for value in mpmath.eig(whole, left=False, right=False))
 
 
-@settings(derandomize=True, max_examples=60)
+@examples(60)
 @given(place=PLACES.filter(lambda one: one.force_delay_samples <= 7))
 def test_the_exact_radius_is_the_largest_eigenvalue_of_the_matrix_exponential(place: Place) -> None:
     turns = math.sqrt(place.hand_stiffness_n_per_m / place.mass_kg) * place.period_s
@@ -205,7 +204,7 @@ def test_the_map_is_what_the_plant_does_to_unit_states() -> None:
     assert columns[4].tolist() == pytest.approx([-5000.0 * per_force, 0.0, 2000.0 * per_force, 0.0, 0.0])
 
 
-@settings(derandomize=True, max_examples=40)
+@examples(40)
 @given(place=PLACES.filter(lambda one: one.force_delay_samples <= 3))
 def test_powers_grow_as_the_eigenvalues_say(place: Place) -> None:
     try:
@@ -231,7 +230,7 @@ def test_a_map_is_judged_by_its_slowest_mode_without_waiting_for_it() -> None:
 # --- both ------------------------------------------------------------------------------------------------------------
 
 
-@settings(derandomize=True, max_examples=120)
+@examples(120)
 @given(places=st.lists(PLACES, min_size=1, max_size=8))
 def test_beyond_the_grid_no_linear_loop_is_judged_otherwise_than_by_its_eigenvalues(places: list[Place]) -> None:
     kept = [place for place in places if not refused(place)]
@@ -255,7 +254,7 @@ def test_a_map_with_three_close_eigenvalues_is_squared_with_more_digits() -> Non
     assert findings(place, row) == []
 
 
-@settings(derandomize=True, max_examples=60)
+@examples(60)
 @given(place=PLACES)
 def test_beyond_the_grid_every_run_balances_or_is_refused_by_a_limit(place: Place) -> None:
     assert [one for one in findings(place, row_of(place)) if not one.explained] == []

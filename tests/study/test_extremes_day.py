@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.cli import main
@@ -29,7 +29,6 @@ from hapticd.study.extremes.day import (
 NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False).filter(lambda value: value == 0.0 or abs(value) > 1e-100)
 
 
-@settings(derandomize=True)
 @given(pairs=st.lists(st.tuples(NUMBERS, NUMBERS), max_size=60))
 def test_a_sum_of_products_keeps_what_a_double_loses(pairs: list[tuple[float, float]]) -> None:
     sums = np.zeros(2)

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgpack
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hapticd.client import (
@@ -36,6 +36,7 @@ from hapticd.client import (
 )
 from hapticd.contracts import event as contract
 from hapticd.telemetry.wire import Topic, new_packer
+from tests.examples import examples
 from tests.telemetry.sockets import PATIENCE_S, Wire, served, ticks, wait_until
 
 EVERY_TICK = (Position, Energy, Damping, Timing)
@@ -267,7 +268,7 @@ def test_any_bytes_are_records_or_an_error_that_says_so(topic: bytes, payload: b
         assert isinstance(decode(topic, payload), list)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(TOPICS, st.lists(st.dictionaries(KEYS, TREES)) | TREES)
 def test_any_msgpack_is_records_or_an_error_in_one_line(topic: bytes, payload: Any) -> None:
     text, records = "", []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import WallConfig
@@ -18,7 +18,6 @@ def wall(stiffness_n_per_m: float, *at_s: float) -> WallConfig:
     return WallConfig.model_validate({"stiffness_n_per_m": stiffness_n_per_m, "changes": changes})
 
 
-@settings(derandomize=True)
 @given(at_s=TIMES, since=st.integers(0, 10**6))
 def test_it_is_what_the_loops_own_wall_is_at_every_tick(at_s: set[float], since: int) -> None:
     config = wall(12000.0, *at_s)

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hapticd_drivers.rig import messages
@@ -20,6 +20,7 @@ from hapticd_drivers.rig.messages import State
 from hapticd_drivers.rig.metrics import METRICS
 from hapticd_drivers.rig.serial_rig import SerialRig, SerialRigOptions
 from tests.drivers.rig.device import Rig
+from tests.examples import examples
 
 TICKS = 1500
 RECOVERY_TICKS = 3
@@ -173,7 +174,7 @@ def test_a_noisy_line_costs_frames_and_nothing_else(
     driver.close()
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(garbage=st.lists(st.binary(min_size=1, max_size=300), min_size=1, max_size=5))
 def test_whatever_bytes_come_the_next_ticks_answer_is_found(rig: Rig, garbage: list[bytes]) -> None:
     """Bytes that nobody meant, in front of each answer."""
