@@ -29,6 +29,8 @@ class Cluster:
     def __init__(self, folder: Path) -> None:
         self.address = folder / "scheduler.json"
         self._folder = folder
+        # A worker that is killed leaves its scratch behind.
+        self._environment = {**os.environ, "PYTHONPATH": str(ROOT), "DASK_TEMPORARY_DIRECTORY": str(folder)}
         self._processes: list[subprocess.Popen[bytes]] = []
         self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-jupyter")
         # The file is there before its text is.
@@ -47,7 +49,7 @@ class Cluster:
         ]
         log = (self._folder / f"{role}-{len(self._processes)}.log").open("wb")
         with log:
-            process = subprocess.Popen(command, stdout=log, stderr=log, cwd=self._folder, env=environment())
+            process = subprocess.Popen(command, stdout=log, stderr=log, cwd=self._folder, env=self._environment)
         self._processes.append(process)
         return process
 
@@ -55,10 +57,6 @@ class Cluster:
         for process in reversed(self._processes):
             process.kill()
             process.wait()
-
-
-def environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
 def wait(condition: Callable[[], bool], at_most_s: float = 60.0) -> None:
