@@ -92,10 +92,10 @@ class Faulty(Loopback):
         return sample
 
     def _write(self, force_n: Sequence[float]) -> None:
-        order = self._told()
-        if order == "hang-write":
+        # What is told since this tick's read begins with the next one: this force knows nothing of it.
+        if self._order == "hang-write":
             time.sleep(HANG_S)
-        if order == "no-write":
+        if self._order == "no-write":
             raise DeviceDisconnectedError("faulty: unplugged while it was written to")
         super()._write(force_n)
         self._applied(force_n[0], 1)
@@ -103,7 +103,7 @@ class Faulty(Loopback):
     def _disable(self) -> None:
         super()._disable()
         self._applied(0.0, 0)
-        if self._told() == "hang-close":
+        if self._order == "hang-close":
             time.sleep(0.3)
 
     def _applied(self, newton: float, writes: int) -> None:
