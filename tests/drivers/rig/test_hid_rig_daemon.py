@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
+from statistics import median
 
 import pytest
 
@@ -27,6 +28,7 @@ START_M = 0.002
 STALLED_TICKS = 50
 HELD_TICKS = 300
 LONGEST_TICKS = 10_000
+LOOKS = 25
 ATTEMPTS = 5
 PRESS_S = 10.0
 BUSY = {EventCode.LOOP_LATE, EventCode.DEVICE_FROZEN, EventCode.DEVICE_LOST}
@@ -112,9 +114,10 @@ def test_a_wall_holds_the_hand_and_the_rig_agrees_where(double: HidDouble, daemo
                 held.append(position_m)
                 still = len(held) == HELD_TICKS and max(held) - min(held) < 2e-4
                 if still and min(held) == pytest.approx(-DEPTH_M, rel=0.1):
-                    look = double.look()
-                    assert look.x_m == pytest.approx(-DEPTH_M, rel=0.15)
-                    assert look.force_un == pytest.approx(1e6 * PRESS_N, rel=0.15)
+                    # The law brakes what is left of the motion: one force alone is not yet the balance.
+                    looks = [double.look() for _ in range(LOOKS)]
+                    assert median(look.x_m for look in looks) == pytest.approx(-DEPTH_M, rel=0.15)
+                    assert median(look.force_un for look in looks) == pytest.approx(1e6 * PRESS_N, rel=0.15)
                     return
                 if faults:
                     break
