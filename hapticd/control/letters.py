@@ -112,7 +112,7 @@ class Letters:
         tick = self._loop.tick
         if not tick.tare():
             raise HapticdError("tare moves the walls: `hapticd disarm` first, and the device must know where it is")
-        axes = zip(tick.info.axes, tick.origin_m, strict=True)
+        axes = zip(tick.info.axes, tick.motion.origin_m, strict=True)
         origin_m: dict[str, float | int | str] = {f"origin_{axis}_m": origin for axis, origin in axes}
         self._loop.event(EventCode.TARED, "tared: positions count from here", **origin_m)
         yield

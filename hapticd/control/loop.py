@@ -250,6 +250,7 @@ class ControlLoop:
 
     def _record(self, sample: Sample, deadline_ns: int, late_us: float, busy_us: float, skipped: int) -> None:
         tick = self.tick
+        motion = tick.motion
         past = tick.past
         energy_j = past.energy_j
         stored_j = past.stored_j
@@ -288,7 +289,7 @@ class ControlLoop:
             deadline_ns,
             late_us,
             busy_us,
-            tick.dt_s,
+            motion.dt_s,
             skipped,
             tick.flags if sample.calibrated else tick.flags | _UNCALIBRATED,
             self.law_count,
@@ -299,8 +300,8 @@ class ControlLoop:
             dissipated_j,
             generated_j,
             count,
-            *tick.position_m,
-            *tick.velocity_m_per_s,
+            *motion.position_m,
+            *motion.velocity_m_per_s,
             *tick.force_n,
             *tick.requested_n,
             *(sample.orientation if self._has_orientation else ()),

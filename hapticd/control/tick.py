@@ -10,31 +10,18 @@ from collections.abc import Callable, Iterable
 
 from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
 from hapticd.contracts.device import DeviceInfo
-from hapticd.contracts.errors import ConfigError
 from hapticd.contracts.event import EventCode
 from hapticd.contracts.record import Flag
 from hapticd.contracts.sample import Sample
 from hapticd.control import fallback
-from hapticd.control.contact import Contact, RunningLaw
+from hapticd.control.contact import Contact, RunningLaw, heirs
+from hapticd.control.motion import Motion
 from hapticd.energy import EnergyLedger
 from hapticd.guard import BLIND_RAMP_S, Guard, Mode, limits
 from hapticd.scene import Wall, compile_walls
-from hapticd.velocity import Estimator, make_estimator
 
 FROZEN_TICKS = 20
 """Samples in a row with the same device time or count after which a device counts as frozen."""
-
-LEAST_S = 1e-9
-MOST_S = 1.0
-"""Time between two samples [s]: less is standing still, and for longer the nominal period goes into the laws."""
-
-MOST_M = 1e7
-MOST_M_PER_S = 1e6
-"""No position and no velocity is beyond these, whatever a device declares [m], [m/s]."""
-
-MARGIN = 0.5
-"""How far outside its declared workspace, as a share of its size, a device may claim to be."""
-
 
 _IMPOSSIBLE = "the device reported a position that is not possible"
 _MODE_FLAGS = (0, int(Flag.ARMED), int(Flag.RELEASING))  # in the order of guard.Mode
@@ -56,14 +43,12 @@ class ControlTick:
         ramp_s: duration of every ramp [s].
 
     Attributes:
+        motion: where the device is and how fast, as used by the last tick.
         contacts: one a wall, in scene order.
         leaving: walls that are gone and whose force still fades out.
         past: books of the walls that are gone, so that the sums over all walls never jump.
         force_n: force applied by the last tick, one element an axis [N].
         requested_n: what the laws asked for [N].
-        position_m, velocity_m_per_s: as used by the last tick.
-        dt_s: time between the last two samples [s].
-        origin_m: where the device places the point that positions count from, one element an axis [m].
         fault: code of a fault raised by the last tick, 0 when there was none; the loop takes and clears it.
         fault_text: what there is to say about it.
 
@@ -81,10 +66,9 @@ class ControlTick:
         period_s: float,
         ramp_s: float,
     ) -> None:
-        if velocity.estimator == "device" and not info.has_velocity:
-            raise ConfigError(f'velocity.estimator = "device": {info.model} does not measure its velocity')
         axes = len(info.axes)
         self.info = info
+        self.motion = Motion(velocity, info, period_s)
         self.guard = guard
         self.period_s = period_s
         self.ramp_s = ramp_s
@@ -94,29 +78,14 @@ class ControlTick:
         ]
         self.leaving: list[Contact] = []
         self.past = EnergyLedger()
-        self.estimators: list[Estimator] = [make_estimator(velocity, info.resolution_m) for _ in range(axes)]
         self.force_n = [0.0] * axes
         self.requested_n = [0.0] * axes
-        self.position_m = [0.0] * axes
-        self.velocity_m_per_s = [0.0] * axes
-        self.dt_s = period_s
-        self.origin_m = [0.0] * axes
         self.fallback = False
         self.fault = 0
         self.fault_text = ""
         self._last_fault = 0
         self._axes = range(axes)
-        self._bounds_m = [
-            (max(low - MARGIN * (high - low), -MOST_M), min(high + MARGIN * (high - low), MOST_M))
-            for low, high in info.workspace_m
-        ]
         self._active = self.contacts  # and those that leave
-        self._has_clock = info.has_clock
-        self._has_sequence = info.has_sequence
-        self._time_ns = -1
-        self._sequence = -1
-        self._frozen = 0
-        self._waited_s = 0.0
         self._blind = True
         self._excused = False
         self._blind_gain = 0.0
@@ -146,18 +115,12 @@ class ControlTick:
         Raises:
             PluginError: the law cannot start.
         """
-        self._time_ns = sample.time_ns
-        self._sequence = sample.sequence
-        self._blind = not self._possible(sample)
+        self._blind = not self.motion.start(sample)
         self._excused = not sample.calibrated
         if self._blind and sample.calibrated:
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
-        if not self._blind:
-            for axis in self._axes:
-                self.position_m[axis] = position_m = sample.position_m[axis]
-                self.estimators[axis].start(position_m)
         for contact in self.contacts:
-            contact.start(self.position_m[contact.wall.axis])
+            contact.start(self.motion.position_m[contact.wall.axis])
             contact.law.start(contact.snapshot(0.0))
 
     def arm(self) -> bool:
@@ -182,7 +145,8 @@ class ControlTick:
         """Count positions from here on. False while forces are let through or nobody knows where the device is."""
         if self._blind or self.guard.mode is not Mode.DISARMED:
             return False
-        self._move_origin([origin + at for origin, at in zip(self.origin_m, self.position_m, strict=True)])
+        motion = self.motion
+        self._move_origin([origin + at for origin, at in zip(motion.origin_m, motion.position_m, strict=True)])
         return True
 
     def forget_origin(self) -> None:
@@ -262,17 +226,25 @@ class ControlTick:
         Returns:
             The force to write, one element an axis [N]; the same list every time.
         """
-        seen = self._see(sample, clock_dt_s)
+        motion = self.motion
+        guard = self.guard
+        seen = motion.see(sample, clock_dt_s, self._blind)
+        if guard.mode is Mode.ARMED:
+            limit = guard.max_speed_m_per_s
+            if motion.repeated >= FROZEN_TICKS:
+                self.fail(EventCode.DEVICE_FROZEN, f"the device repeated the same sample {FROZEN_TICKS} times")
+            elif seen and motion.speed_squared > limit * limit:
+                speed = math.sqrt(motion.speed_squared)
+                self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
         if not seen or self._blind:
             if not seen or self._blind_gain > 0.0:
                 return self._step_blind(sample.calibrated)
             self._see_again()
-        position_m = self.position_m
-        velocity_m_per_s = self.velocity_m_per_s
+        position_m = motion.position_m
+        velocity_m_per_s = motion.velocity_m_per_s
         requested_n = self.requested_n
         force_n = self.force_n
-        dt_s = self.dt_s
-        guard = self.guard
+        dt_s = motion.dt_s
         contacts = self._active
         for axis in self._axes:
             requested_n[axis] = force_n[axis] = 0.0
@@ -302,68 +274,13 @@ class ControlTick:
         return force_n
 
     def _move_origin(self, origin_m: list[float]) -> None:
-        for axis in self._axes:
-            self.position_m[axis] += self.origin_m[axis] - origin_m[axis]
-            self.velocity_m_per_s[axis] = 0.0
-            self.estimators[axis].start(self.position_m[axis])
-        self.origin_m = origin_m
+        self.motion.move_origin(origin_m)
         for contact in self._active:
-            contact.start(self.position_m[contact.wall.axis])
+            contact.start(self.motion.position_m[contact.wall.axis])
 
     def _fallback_law(self) -> RunningLaw:
         params = fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m)
         return RunningLaw(fallback, params)
-
-    def _possible(self, sample: Sample) -> bool:
-        """Whether the device may be where it says; a NaN is nowhere."""
-        return all(low <= at <= high for at, (low, high) in zip(sample.position_m, self._bounds_m, strict=True))
-
-    def _see(self, sample: Sample, clock_dt_s: float) -> bool:
-        """Take a sample in; False when it makes no sense."""
-        if self._has_clock:
-            dt_s = (sample.time_ns - self._time_ns) * 1e-9
-            frozen = dt_s <= 0.0
-            self._time_ns = sample.time_ns
-        else:
-            frozen = self._has_sequence and sample.sequence == self._sequence
-            self._sequence = sample.sequence
-            # The same sample once more: as on a device's own clock, time stands still until there is news.
-            self._waited_s += clock_dt_s
-            dt_s = 0.0 if frozen else self._waited_s
-            if not frozen:
-                self._waited_s = 0.0
-        if frozen:
-            self._frozen += 1
-            if self._frozen >= FROZEN_TICKS and self.guard.mode is Mode.ARMED:
-                self.fail(EventCode.DEVICE_FROZEN, f"the device repeated the same sample {FROZEN_TICKS} times")
-        elif self._frozen:
-            self._frozen = 0
-        if LEAST_S <= dt_s < MOST_S:
-            self.dt_s = dt_s
-        else:
-            self.dt_s = self.period_s
-            if not MOST_S <= dt_s < math.inf:
-                dt_s = 0.0
-        speed_squared = 0.0
-        origin_m = self.origin_m
-        for axis in self._axes:
-            position_m = sample.position_m[axis]
-            low_m, high_m = self._bounds_m[axis]
-            if not low_m <= position_m <= high_m:  # false for NaN as well
-                return False
-            position_m -= origin_m[axis]
-            if self._blind:
-                self.estimators[axis].start(position_m)
-            velocity_m_per_s = self.estimators[axis].update(position_m, dt_s, sample.velocity_m_per_s[axis])
-            if not -MOST_M_PER_S < velocity_m_per_s < MOST_M_PER_S:
-                return False
-            self.position_m[axis] = position_m
-            self.velocity_m_per_s[axis] = velocity_m_per_s
-            speed_squared += velocity_m_per_s * velocity_m_per_s
-        limit = self.guard.max_speed_m_per_s
-        if speed_squared > limit * limit and self.guard.mode is Mode.ARMED:
-            self.fail(EventCode.OVER_SPEED, f"{math.sqrt(speed_squared):.3g} m/s is above the limit of {limit:g} m/s")
-        return True
 
     def _replace_laws(self, contact: Contact, error: BaseException) -> None:
         """A law raised or returned nonsense: all are replaced, and asked again."""
@@ -402,46 +319,40 @@ class ControlTick:
         """Positions make sense again: stand there, at rest and without force; if armed meanwhile, come in by a ramp."""
         self._blind = False
         for contact in self._active:
-            contact.start(self.position_m[contact.wall.axis])
+            contact.start(self.motion.position_m[contact.wall.axis])
             self._blend(contact)
 
     def _started(
         self, contacts: Iterable[Contact], make_law: Callable[[], RunningLaw]
     ) -> list[tuple[Contact, RunningLaw]]:
         """A law for each contact, started where the contact is now; nothing has changed yet."""
+        velocity_m_per_s = self.motion.velocity_m_per_s
         laws = []
         for contact in contacts:
             law = make_law()
-            law.start(contact.snapshot(self.velocity_m_per_s[contact.wall.axis]))
+            law.start(contact.snapshot(velocity_m_per_s[contact.wall.axis]))
             laws.append((contact, law))
         return laws
 
     def _take_laws(self, laws: Iterable[tuple[Contact, RunningLaw]]) -> None:
+        motion = self.motion
         for contact, law in laws:
-            contact.take_law(law, self.velocity_m_per_s[contact.wall.axis], self.dt_s)
+            contact.take_law(law, motion.velocity_m_per_s[contact.wall.axis], motion.dt_s)
 
     def _blend(self, contact: Contact) -> None:
         contact.blend(self.ramp_ticks, self.guard.gain, self.guard.limit_n)
 
     def _arrange(self, walls: list[Wall]) -> tuple[list[Contact], list[tuple[Contact, Wall]]]:
         """Contacts for these walls, old ones where they fit, and which of those have to take their new wall."""
-        free = list(self.contacts)
-        found: dict[int, Contact] = {}
-        changed = []
-        for same in (lambda old, new: old.config == new.config, Wall.same_place):
-            for index, wall in enumerate(walls):
-                contact = next((each for each in free if index not in found and same(each.wall, wall)), None)
-                if contact is not None:
-                    free.remove(contact)
-                    found[index] = contact
-                    if contact.wall.config != wall.config:
-                        changed.append((contact, wall))
         contacts = []
-        for index, wall in enumerate(walls):
-            if index not in found:
-                found[index] = Contact(wall, self._fallback_law(), self.info.resolution_m)
-                found[index].start(self.position_m[wall.axis])
-            contacts.append(found[index])
+        changed = []
+        for wall, heir in zip(walls, heirs(walls, self.contacts), strict=True):
+            contact = heir or Contact(wall, self._fallback_law(), self.info.resolution_m)
+            if heir is None:
+                contact.start(self.motion.position_m[wall.axis])
+            elif heir.wall.config != wall.config:
+                changed.append((heir, wall))
+            contacts.append(contact)
         return contacts, changed
 
     def _let_go(self, contact: Contact) -> None:

@@ -148,7 +148,7 @@ class OfflineRun:
                 count * period_ns / 1e9,
                 model.x_m,
                 model.v_m_per_s,
-                first.x_m if first else tick.position_m[0],
+                first.x_m if first else tick.motion.position_m[0],
                 outward * tick.force_n[axis],
                 outward * tick.requested_n[axis],
                 sum([ledger.energy_j for ledger in ledgers]),

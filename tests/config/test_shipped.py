@@ -37,7 +37,7 @@ def depths_m(name: str, seconds: float) -> tuple[list[float], float]:
     depths = []
     for _ in range(round(seconds / period_s)):
         driver.write(tick.step(driver.read(), period_s))
-        depths.append(-tick.position_m[0])
+        depths.append(-tick.motion.position_m[0])
     driver.close()
     options = tomllib.loads(loaded.text)["device"]["options"]
     called_for = -options["hand"]["force"]["newton"] / loaded.config.scene.walls[0].stiffness_n_per_m

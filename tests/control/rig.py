@@ -121,10 +121,11 @@ class Rig:
             self.sample.position_m[:] = position_m
             self.sample.time_ns += round(dt_s * 1e9)
             self.sample.sequence += 1
-            before_m, before_n = list(self.tick.position_m), list(self.tick.force_n)
+            here_m = self.tick.motion.position_m  # always the same list
+            before_m, before_n = list(here_m), list(self.tick.force_n)
             written.append(list(self.tick.step(self.sample, dt_s)))
             self.energy_j -= sum(
-                newton * (now - was) for newton, now, was in zip(before_n, self.tick.position_m, before_m, strict=True)
+                newton * (now - was) for newton, now, was in zip(before_n, here_m, before_m, strict=True)
             )
         return written
 

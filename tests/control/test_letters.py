@@ -33,13 +33,13 @@ def configured(text: str) -> LoadedConfig:
 
 def test_tare_takes_the_present_position_as_the_origin_of_positions_and_walls(bench: Bench) -> None:
     bench.ticks(5)
-    here_m = bench.tick.position_m[0]
+    here_m = bench.tick.motion.position_m[0]
     assert here_m == pytest.approx(0.02)
     assert bench.ask(do="tare") == ""
     assert bench.told()[EventCode.TARED].fields == {"origin_x_m": here_m}
     bench.ticks(1)
-    assert bench.tick.position_m == [0.0]
-    assert bench.tick.velocity_m_per_s == [0.0], "nothing has moved"
+    assert bench.tick.motion.position_m == [0.0]
+    assert bench.tick.motion.velocity_m_per_s == [0.0], "nothing has moved"
     assert bench.tick.contacts[0].x_m == 0.0, "the wall stands where the device is"
 
 
@@ -47,7 +47,7 @@ def test_a_tare_on_a_tare_counts_from_the_device_as_well(bench: Bench) -> None:
     bench.ticks(1)
     bench.ask(do="tare")
     assert bench.ask(do="tare") == ""
-    assert bench.tick.origin_m == pytest.approx([0.02])
+    assert bench.tick.motion.origin_m == pytest.approx([0.02])
 
 
 @pytest.mark.parametrize("mode", ["armed", "releasing", "blind"])
@@ -64,7 +64,7 @@ def test_tare_is_refused_with_a_force_or_without_a_position_and_moves_nothing(
         nowhere.position_m[0] = math.nan
         monkeypatch.setattr(bench.driver, "read", lambda: nowhere)
     assert "hapticd disarm" in bench.ask(do="tare")
-    assert bench.tick.origin_m == [0.0]
+    assert bench.tick.motion.origin_m == [0.0]
 
 
 def test_a_tared_scene_is_kept_through_a_switch_and_felt_where_it_is(bench: Bench) -> None:
@@ -72,7 +72,7 @@ def test_a_tared_scene_is_kept_through_a_switch_and_felt_where_it_is(bench: Benc
     bench.ask(do="tare")
     wanted = configured(WALLS.replace("12000.0", "9000.0"))
     assert bench.ask(**switch_letter(START, wanted)) == ""
-    assert bench.tick.origin_m == pytest.approx([0.02])
+    assert bench.tick.motion.origin_m == pytest.approx([0.02])
     assert bench.ask(do="arm") == ""
     bench.ticks(1)
     sample = bench.driver.read()
@@ -85,9 +85,9 @@ def test_a_calibration_forgets_the_origin_since_the_device_may_count_from_elsewh
     bench.ticks(1)
     bench.ask(do="tare")
     assert bench.ask(do="calibrate") == ""
-    assert bench.tick.origin_m == [0.0]
+    assert bench.tick.motion.origin_m == [0.0]
     bench.ticks(1)
-    assert bench.tick.position_m == pytest.approx([0.02])
+    assert bench.tick.motion.position_m == pytest.approx([0.02])
 
 
 def test_a_switch_that_is_refused_leaves_law_scene_and_limits_as_they_were(bench: Bench) -> None:

@@ -25,7 +25,7 @@ def speeds_m_per_s(velocity: VelocityConfig, **declared: Any) -> list[float]:
             rig.sample.sequence += 1
             rig.sample.time_ns = round(number * PERIOD_S * 1e9)
         rig.tick.step(rig.sample, PERIOD_S)
-        seen.append(rig.tick.velocity_m_per_s[0])
+        seen.append(rig.tick.motion.velocity_m_per_s[0])
     assert rig.tick.fault == 0
     return seen[EVERY * 16 :]
 
@@ -47,7 +47,7 @@ def test_without_clock_and_count_nobody_can_tell_a_repeated_sample_from_a_rest()
         if number % EVERY == 0:
             rig.sample.position_m[0] += SPEED_M_PER_S * EVERY * PERIOD_S
         rig.tick.step(rig.sample, PERIOD_S)
-    assert rig.tick.velocity_m_per_s[0] == pytest.approx(EVERY * SPEED_M_PER_S)
+    assert rig.tick.motion.velocity_m_per_s[0] == pytest.approx(EVERY * SPEED_M_PER_S)
 
 
 def test_the_time_that_a_law_is_told_is_the_time_that_passed() -> None:
@@ -58,5 +58,5 @@ def test_the_time_that_a_law_is_told_is_the_time_that_passed() -> None:
             rig.sample.sequence += 1
         rig.tick.step(rig.sample, PERIOD_S)
         if fresh:
-            told.append(rig.tick.dt_s)
+            told.append(rig.tick.motion.dt_s)
     assert told == pytest.approx([3 * PERIOD_S] * 20)

@@ -60,10 +60,10 @@ def test_a_release_under_a_moving_hand_generates_nothing_that_the_hold_did_not()
     rig.tick.release()
     made_j = rig.books_j[3]
     for count in range(60):
-        before_m = rig.tick.position_m[0]
+        before_m = rig.tick.motion.position_m[0]
         rig.force(-2e-3 - 1e-3 * math.sin(0.3 * count))
         now_j = rig.books_j[3]
-        assert now_j - made_j <= 0.5 * 2000.0 * (rig.tick.position_m[0] - before_m) ** 2 + 1e-12
+        assert now_j - made_j <= 0.5 * 2000.0 * (rig.tick.motion.position_m[0] - before_m) ** 2 + 1e-12
         made_j = now_j
     assert rig.books_j[1] == 0.0
 

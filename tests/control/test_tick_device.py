@@ -81,8 +81,8 @@ def test_whatever_the_device_says_the_written_force_is_finite_and_bounded(
         sample.velocity_m_per_s[:] = velocity_m_per_s
         force_n = tick.step(sample, clock_dt_s)
         assert math.hypot(*force_n) <= LIMIT_N * (1.0 + 1e-9)
-        assert 0.0 < tick.dt_s < 1.0
-        numbers = [*tick.position_m, *tick.velocity_m_per_s, *tick.requested_n, *rig.books_j]
+        assert 0.0 < tick.motion.dt_s < 1.0
+        numbers = [*tick.motion.position_m, *tick.motion.velocity_m_per_s, *tick.requested_n, *rig.books_j]
         assert all(map(math.isfinite, numbers))
         for contact in tick.contacts:
             assert math.isfinite(contact.damping_n_s_per_m + contact.felt_mass_kg + contact.applied_n)
@@ -119,7 +119,7 @@ def test_after_a_blind_moment_neither_velocity_nor_books_see_a_jump() -> None:
     rig.forces(math.nan, 20)
     for _ in range(6):
         rig.force(-22e-3)
-        assert rig.tick.velocity_m_per_s == [0.0]
+        assert rig.tick.motion.velocity_m_per_s == [0.0]
     assert rig.books_j[0] == energy_j
 
 

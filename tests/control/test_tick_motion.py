@@ -21,7 +21,7 @@ def test_a_device_that_repeats_itself_is_frozen_after_twenty_samples(kind: str) 
     for count in range(FROZEN_TICKS):
         assert rig.tick.fault == 0, count
         assert rig.tick.step(sample, PERIOD_S) != [0.0]
-        assert rig.tick.dt_s == PERIOD_S
+        assert rig.tick.motion.dt_s == PERIOD_S
     assert rig.tick.fault == EventCode.DEVICE_FROZEN
     assert rig.tick.guard.latched
 
@@ -41,7 +41,7 @@ def test_a_device_that_is_still_frozen_fails_again_when_it_is_armed() -> None:
 def test_a_clock_that_once_runs_back_is_one_bad_sample_and_no_fault() -> None:
     rig = pressed(has_clock=True)
     rig.force(-2e-3, dt_s=-5.0)
-    assert rig.tick.dt_s == PERIOD_S
+    assert rig.tick.motion.dt_s == PERIOD_S
     assert rig.force(-2e-3, ticks=30) == 4.0
     assert rig.tick.fault == 0
 
@@ -50,10 +50,10 @@ def test_after_a_long_gap_velocity_is_what_it_was_over_the_gap_and_laws_reckon_w
     """A computer that slept for 3 s finds the hand 30 mm further: that was 10 mm/s, and not 30 m/s."""
     rig = Rig(wall(2000.0), at_m=0.0, has_clock=True, safety={"max_speed_m_per_s": 1.0})
     rig.force(0.03, dt_s=3.0)
-    assert rig.tick.velocity_m_per_s == [pytest.approx(0.01)]
-    assert rig.tick.dt_s == PERIOD_S
+    assert rig.tick.motion.velocity_m_per_s == [pytest.approx(0.01)]
+    assert rig.tick.motion.dt_s == PERIOD_S
     rig.force(0.03)
-    assert rig.tick.velocity_m_per_s == [0.0]
+    assert rig.tick.motion.velocity_m_per_s == [0.0]
     assert rig.tick.fault == 0
 
 
@@ -61,7 +61,7 @@ def test_while_the_clock_stands_still_the_last_velocity_stands() -> None:
     rig = Rig(wall(2000.0), at_m=0.0, has_clock=True)
     rig.force(1e-3)
     rig.force(3e-3, dt_s=0.0)
-    assert rig.tick.velocity_m_per_s == [pytest.approx(1.0)]
+    assert rig.tick.motion.velocity_m_per_s == [pytest.approx(1.0)]
 
 
 def test_a_device_that_is_too_fast_is_let_go_by_a_ramp() -> None:

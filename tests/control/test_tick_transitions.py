@@ -171,7 +171,7 @@ def test_whatever_is_asked_in_whatever_order_the_force_goes_by_ramps(path: list[
             rig.tick.release(FASTER_TICKS * PERIOD_S)
             faster_ticks = FASTER_TICKS
         for count in range(ticks):
-            before_m, before_m_per_s = position_m, rig.tick.velocity_m_per_s[0]
+            before_m, before_m_per_s = position_m, rig.tick.motion.velocity_m_per_s[0]
             moving = deed == "nothing"
             position_m = min(0.01, max(-0.01, position_m + move_m)) if moving else position_m
             dark = deed == "dark" or (deed == "nan" and count < 4)
@@ -187,7 +187,7 @@ def test_whatever_is_asked_in_whatever_order_the_force_goes_by_ramps(path: list[
                 ramps += LIMIT_N / BLIND_TICKS
             faster_ticks -= 1
             moved = 2.0 * spring * abs(position_m - before_m)
-            moved += len(contacts) * 10.0 * abs(rig.tick.velocity_m_per_s[0] - before_m_per_s)
+            moved += len(contacts) * 10.0 * abs(rig.tick.motion.velocity_m_per_s[0] - before_m_per_s)
             # A law that pushes alike at every depth starts and ends with the contact, by itself.
             edges = LIMIT_N * 2.0 if any((before_m < face_m) != (position_m < face_m) for face_m in FACES_M) else 0.0
             assert abs(force_n - last_n) <= ramps + moved + edges + 1e-9
