@@ -31,6 +31,9 @@ HIDRAW_CLASS = Path("/sys/class/hidraw")
 INSTALL_RULE = "sudo hapticd service install  # then replug"
 """Gives the user the device, as a line for a shell."""
 
+SAY_WHICH = "# in the configuration, [device.options]: serial = ...; hapticd devices hid-rig lists them"
+"""What to do where it is not clear which rig is meant."""
+
 _MODULES = {"hidraw": "hidraw", "libusb": "hid"}
 
 _RAW_INTERFACE = 0
@@ -99,20 +102,13 @@ def open_device(options: HidRigOptions) -> OpenHid:
         DriverError: there is none, there are several, or it cannot be opened.
     """
     found = look(options)
-    name = f"{options.vendor_id:04x}:{options.product_id:04x}"
     if not found:
-        raise DeviceNotFoundError(
-            f"hid-rig: no HID device {name} with usage page 0x{options.usage_page:04x} is plugged in (lsusb)"
-        )
-    wanted = [device for device in found if options.serial in (None, device.serial)]
-    there = ", ".join(f"{device.serial or 'one without serial number'} ({device.where})" for device in found)
-    if not wanted:
-        raise DeviceNotFoundError(f'hid-rig: no {name} has serial number "{options.serial}"; there is {there}')
-    if len(wanted) > 1:
-        raise DeviceNotFoundError(
-            f"hid-rig: several {name} are plugged in: set device.options.serial; there is {there}"
-        )
-    return _opened(wanted[0])
+        looked_for = f"{_numbers(options)} with usage page 0x{options.usage_page:04x}"
+        raise DeviceNotFoundError(f"hid-rig: no HID device {looked_for} is plugged in (lsusb)")
+    wanted, unclear = _meant(found, options)
+    if wanted is None:
+        raise DeviceNotFoundError(f"hid-rig: {unclear}")
+    return _opened(wanted)
 
 
 def find_devices(options: HidRigOptions) -> list[FoundDevice]:
@@ -131,15 +127,18 @@ def find_devices(options: HidRigOptions) -> list[FoundDevice]:
 
 
 def diagnose(options: HidRigOptions) -> list[Diagnosis]:
-    """Whether hidapi and the kernel have what the driver needs."""
+    """Whether hidapi and the kernel have what the driver needs, and whether it is clear which rig is meant."""
     backend = _chosen(options)
     module = _module(backend)
     if module is None:
         text = f"the installed hidapi has no module {_MODULES[backend]}, which device.options.backend needs"
         return [Diagnosis("problem", text, ("pip install --force-reinstall hidapi",))]
     if backend == "libusb" and options.backend == "auto":
-        return [Diagnosis("advice", "no hidraw here: the rig is reached through libusb, which is slower")]
-    return [Diagnosis("ok", f"hidapi {module.version_str()} reaches the rig through {backend}")]
+        told = Diagnosis("advice", "no hidraw here: the rig is reached through libusb, which is slower")
+    else:
+        told = Diagnosis("ok", f"hidapi {module.version_str()} reaches the rig through {backend}")
+    _, unclear = _meant(look(options), options)
+    return [told, Diagnosis("problem", unclear, (SAY_WHICH,))] if unclear else [told]
 
 
 def _chosen(options: HidRigOptions) -> str:
@@ -153,6 +152,21 @@ def _module(backend: str) -> ModuleType | None:
         return importlib.import_module(_MODULES[backend])
     except ImportError:  # a hidapi that was built without it, or libusb is not there
         return None
+
+
+def _numbers(options: HidRigOptions) -> str:
+    return f"{options.vendor_id:04x}:{options.product_id:04x}"
+
+
+def _meant(found: list[HidDevice], options: HidRigOptions) -> tuple[HidDevice | None, str]:
+    """Which of these is meant, or why that is not clear; of none, none, and nothing is unclear."""
+    wanted = [device for device in found if options.serial in (None, device.serial)]
+    if len(wanted) == 1 or not found:
+        return (wanted[0] if wanted else None), ""
+    there = ", ".join(f"{device.serial or 'one without serial number'} ({device.where})" for device in found)
+    if not wanted:
+        return None, f'no {_numbers(options)} has serial number "{options.serial}"; there is {there}'
+    return None, f"several {_numbers(options)} are plugged in: set device.options.serial; there is {there}"
 
 
 def _fits(entry: dict[str, Any], options: HidRigOptions) -> bool:

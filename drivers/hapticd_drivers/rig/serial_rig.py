@@ -8,7 +8,8 @@ from pathlib import Path
 from pydantic import Field
 
 from hapticd.contracts.device import FoundDevice
-from hapticd.contracts.errors import ConfigError
+from hapticd.contracts.diagnosis import Diagnosis
+from hapticd.contracts.errors import ConfigError, DeviceNotFoundError
 from hapticd_drivers.rig import serial_ports
 from hapticd_drivers.rig.driver import RigDriver
 from hapticd_drivers.rig.link import Link
@@ -18,6 +19,9 @@ from hapticd_drivers.rig.serial_link import SerialLink
 
 BITS_A_BYTE = 10
 """On the line: start, eight of data, stop."""
+
+SAY_WHICH = "# in the configuration, [device.options]: port = ...; hapticd devices serial-rig lists them"
+"""What to do where it is not clear which port is meant."""
 
 _STATE_BYTES = 18, 8  # on the line, and for each axis
 
@@ -65,6 +69,21 @@ class SerialRig(RigDriver[SerialRigOptions]):
             for port in ports
             for allowed in [os.access(port.path, os.R_OK | os.W_OK)]
         ]
+
+    @classmethod
+    def diagnose(cls, options: SerialRigOptions | None = None) -> list[Diagnosis]:
+        """Whether it is clear which of the ports is meant; opens none.
+
+        Args:
+            options: those of the configuration.
+        """
+        wanted = serial_ports.AUTO if options is None else options.port
+        try:
+            serial_ports.choose(wanted)
+        except DeviceNotFoundError as error:
+            if serial_ports.usb_ports():  # else there is just no rig
+                return [Diagnosis("problem", str(error).removeprefix("serial-rig: "), (SAY_WHICH,))]
+        return []
 
     def _connect(self) -> Link:
         options = self.options

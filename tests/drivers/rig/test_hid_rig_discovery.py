@@ -127,6 +127,16 @@ def test_among_several_one_has_to_be_named(lists: dict[str, Any]) -> None:
         discovery.open_device(HidRigOptions(serial="3"))
 
 
+def test_the_doctor_hears_when_it_is_not_clear_which_rig_is_meant(lists: dict[str, Any]) -> None:
+    lists["hidraw"] = [entry(b"/dev/hidraw2", "1", **RAW), entry(b"/dev/hidraw4", "2", **RAW)]
+    for options, told in ((HidRigOptions(), "several 16c0:0486"), (HidRigOptions(serial="3"), 'serial number "3"')):
+        ok, problem = discovery.diagnose(options)
+        assert (ok.mark, problem.mark) == ("ok", "problem")
+        assert told in problem.text
+        assert "serial = ..." in problem.mend[0]
+    assert [said.mark for said in discovery.diagnose(HidRigOptions(serial="2"))] == ["ok"]
+
+
 def test_the_doctor_hears_which_backend_there_is(lists: dict[str, Any]) -> None:
     (said,) = discovery.diagnose(HidRigOptions())
     assert (said.mark, said.text) == ("ok", "hidapi 1.2 reaches the rig through hidraw")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import termios
 import tty
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ from hapticd_drivers.rig import messages, serial_link, serial_ports
 from hapticd_drivers.rig.frames import FrameReader
 from hapticd_drivers.rig.serial_link import SerialLink
 from hapticd_drivers.rig.serial_ports import Port
-from hapticd_drivers.rig.serial_rig import SerialRig, SerialRigOptions
+from hapticd_drivers.rig.serial_rig import SAY_WHICH, SerialRig, SerialRigOptions
 
 
 @dataclass(order=True)
@@ -61,6 +62,7 @@ def test_a_port_is_meant_by_path_by_usb_identity_or_by_being_the_only_one(
 ) -> None:
     plugged_in += others
     assert serial_ports.choose(wanted).path == chosen
+    assert SerialRig.diagnose(SerialRigOptions(port=wanted)) == []
 
 
 @pytest.mark.parametrize(
@@ -79,6 +81,9 @@ def test_a_port_that_is_none_or_several_is_told_with_what_there_is(
     plugged_in += others
     with pytest.raises(DeviceNotFoundError, match=says):
         serial_ports.choose(wanted)
+    told = SerialRig.diagnose(SerialRigOptions(port=wanted))
+    assert [(one.mark, one.mend) for one in told] == ([("problem", (SAY_WHICH,))] if others else [])
+    assert all(re.search(says, one.text) for one in told)
 
 
 @pytest.mark.parametrize("port", ["ttyUSB0", "usb:0403", "usb:xyz0:6001", "", "usb:0403:6001:"])
