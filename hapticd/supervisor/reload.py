@@ -46,11 +46,11 @@ class Reload:
         self._watcher: FileWatcher | None = None
         self._follow()
 
-    def ask(self, answer: Answer) -> None:
+    def ask(self, answer: Answer = lambda _: None) -> None:
         """Read the file again at the next turn; a file that cannot be used changes nothing.
 
         Args:
-            answer: told "" when the file is in force, else why it is not.
+            answer: told "" when the file is in force, else why it is not; without one nobody is.
         """
         self._waiting.append(answer)
 

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import signal
 import time
-from dataclasses import replace
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.contracts.event import Event, EventCode
@@ -15,15 +14,16 @@ from hapticd.faults.place import fault_directory
 from hapticd.keys.access import key_ring
 from hapticd.keys.directory import KeyRing
 from hapticd.supervisor.chronicle import Chronicle, log
-from hapticd.supervisor.commands import CommandSocket, Reply
+from hapticd.supervisor.commands import CommandSocket
 from hapticd.supervisor.controlled import END_TIMEOUT_S
 from hapticd.supervisor.instance import InstanceLock
 from hapticd.supervisor.notify import Notifier
+from hapticd.supervisor.orders import Orders
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.release import Release
 from hapticd.supervisor.reload import Reload
 from hapticd.supervisor.report import Report
-from hapticd.supervisor.requests import Answer, Requests
+from hapticd.supervisor.requests import Requests
 from hapticd.supervisor.start import Start
 from hapticd.supervisor.terminal import Terminal
 from hapticd.telemetry.endpoint import CONTROL, TELEMETRY
@@ -43,24 +43,12 @@ STOP_TIMEOUT_S = 3.0
 RECORD_TIMEOUT_S = 3.0
 """How long the end of the daemon waits for a fault record that is being written [s]."""
 
-KNOWN = ("status", "arm", "disarm", "calibrate", "tare", "clear", "reload", "stop")
-"""What the control socket understands."""
-
-
 _FORCES = Flag.ARMED | Flag.RELEASING
 
 
 def pause_s(flush_due_ns: int | None, now_ns: int) -> float:
     """How long to sleep until the next turn, which comes early when ticks wait to be sent [s]."""
     return DRAIN_S if flush_due_ns is None else max(0.0, min(DRAIN_S, (flush_due_ns - WAKE_NS - now_ns) * 1e-9))
-
-
-def _nobody(_verdict: str) -> None:
-    """Answer to a request that nobody waits for."""
-
-
-def _answering(reply: Reply) -> Answer:
-    return lambda verdict: reply(not verdict, verdict)
 
 
 class Service:
@@ -100,6 +88,7 @@ class Service:
             self.recovery = Recovery()
             self.report = Report(instance, offset_ns, config.path.absolute())
             self.chronicle = Chronicle(instance, self.publisher, self.report, fault_directory(instance), offset_ns)
+            self.orders = Orders(self)
             self.reload = Reload(self)
             undo.callback(self.reload.close)
             self._undo = undo.pop_all()
@@ -125,6 +114,32 @@ class Service:
             self.commands.admit(ring)
         self._status_due_s = 0.0
 
+    def stop(self, why: str) -> None:
+        """Let the loop ramp the force out, and end.
+
+        Args:
+            why: who or what wants it.
+        """
+        if self._stopping:
+            return
+        self._stopping = True
+        self._stop_by_s = time.monotonic() + STOP_TIMEOUT_S
+        self.notifier.send("STOPPING=1")
+        self.tell_now(EventCode.STOPPING, f"{why}: ramping the force out")
+        if self.recovery.lost:
+            self.exit_code = 0
+        self.control.stop()
+
+    def tell_now(self, code: EventCode, text: str, **fields: float | int | str) -> None:
+        """Tell of an event that the supervisor itself has to report.
+
+        Args:
+            code: what it is.
+            text: in a line.
+            fields: what programs may want to know of it.
+        """
+        self.chronicle.tell_now(code, text, self.config, self.control, **fields)
+
     def _end_control(self) -> None:
         """See that nobody holds a force any more, whatever the daemon ends for."""
         if not self.control.end() and self.exit_code != 1:  # else it has been seen to
@@ -133,8 +148,8 @@ class Service:
 
     async def _serve(self) -> int:
         loop = asyncio.get_running_loop()
-        loop.add_signal_handler(signal.SIGTERM, self._stop, "SIGTERM")
-        loop.add_signal_handler(signal.SIGINT, self._stop, "interrupt")
+        loop.add_signal_handler(signal.SIGTERM, self.stop, "SIGTERM")
+        loop.add_signal_handler(signal.SIGINT, self.stop, "interrupt")
         loop.add_signal_handler(signal.SIGHUP, self._hang_up)
         settings = self.config.config
         log.info(
@@ -152,7 +167,7 @@ class Service:
             for warning in self.control.warnings:
                 log.warning("%s", warning)
         else:
-            self._tell_now(EventCode.NOT_REALTIME, f"not real-time: {'; '.join(self.control.warnings)}")
+            self.tell_now(EventCode.NOT_REALTIME, f"not real-time: {'; '.join(self.control.warnings)}")
         for note in self.control.info.notes:
             log.warning("%s", note)
         while self.exit_code is None:
@@ -174,7 +189,7 @@ class Service:
             self._look_after_loop(now_s)
         # After it is known whether there is a device: whoever was told that it is lost may say what shall be when it is
         # back.
-        self._obey()
+        self.orders.turn()
         self.reload.turn()
         self.requests.turn()  # last, so that whoever gets an answer finds it in the status as well
         self.chronicle.turn(self.config, self.control)
@@ -207,7 +222,7 @@ class Service:
         self.report.add_dropped(ticks, events)
         for lost, what in ((ticks, "ticks"), (events, "events")):
             if lost:
-                self._tell_now(EventCode.RING_DROPPED, f"{lost} {what} were overwritten before they were published")
+                self.tell_now(EventCode.RING_DROPPED, f"{lost} {what} were overwritten before they were published")
         return len(records)
 
     def _look_after_loop(self, now_s: float) -> None:
@@ -229,7 +244,7 @@ class Service:
         """Tell when nobody stands by to take the force away; the status says so as long as it is so."""
         before, self._problem = self._problem, self.release.problem if self.exit_code is None else ""
         if self._problem and not before:
-            self._tell_now(EventCode.NOBODY_STANDS_BY, self._problem)
+            self.tell_now(EventCode.NOBODY_STANDS_BY, self._problem)
 
     def _look_for_device(self) -> None:
         """Try again when it is time; that nothing ticks meanwhile is no reason for systemd to intervene."""
@@ -242,29 +257,14 @@ class Service:
         self.requests = Requests(control.shared)
         self.report.expect(self.recovery.before)
         away_s = time.monotonic() - self.recovery.lost_s
-        self._tell_now(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)
-
-    def _tell_now(self, code: EventCode, text: str, **fields: float | int | str) -> None:
-        self.chronicle.tell_now(code, text, self.config, self.control, **fields)
+        self.tell_now(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)
 
     def _hang_up(self) -> None:
         """SIGHUP: from a person a reload, from a terminal that is closed the end."""
         if self._terminal.closed():
-            self._stop("the terminal was closed")
+            self.stop("the terminal was closed")
         else:
-            self.reload.ask(_nobody)
-
-    def _stop(self, why: str) -> None:
-        """Let the loop ramp the force out and end."""
-        if self._stopping:
-            return
-        self._stopping = True
-        self._stop_by_s = time.monotonic() + STOP_TIMEOUT_S
-        self.notifier.send("STOPPING=1")
-        self._tell_now(EventCode.STOPPING, f"{why}: ramping the force out")
-        if self.recovery.lost:
-            self.exit_code = 0
-        self.control.stop()
+            self.reload.ask()
 
     def _control_ended(self) -> None:
         self.chronicle.recorder.loop_ended()
@@ -292,44 +292,8 @@ class Service:
         """The loop no longer looks after the device: take the force away from outside, and end."""
         self.control.kill()
         outcome = self.release.release()
-        self._tell_now(EventCode.CONTROL_LOST, f"{text}; {outcome}")
+        self.tell_now(EventCode.CONTROL_LOST, f"{text}; {outcome}")
         self.exit_code = 1
-
-    def _obey(self) -> None:
-        """Do what the control socket asks for."""
-        for request, reply in self.commands.receive():
-            match request["do"]:
-                case "status":
-                    reply(True, status=self.report.status.as_map())
-                case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if self.recovery.lost:
-                    self._obey_without_device(do, reply)
-                case "disarm":
-                    self.requests.disarm(_answering(reply))
-                case "arm" | "calibrate" | "tare" | "clear" as do:
-                    self.requests.submit({"do": do}, _answering(reply))
-                case "reload" if request.get("wait"):
-                    self.reload.ask(_answering(reply))
-                case "reload":
-                    reply(True)
-                    self.reload.ask(_nobody)
-                case "stop":
-                    self._stop("asked over the control socket")
-                    reply(True)
-                case other:
-                    reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
-
-    def _obey_without_device(self, do: str, reply: Reply) -> None:
-        match do:
-            case "arm" | "calibrate" | "tare":
-                reply(False, f"there is no device to {do}: {self.recovery.why}")
-            case "disarm":
-                self.recovery.amend(replace(self.recovery.before, may_arm=False))
-                self._tell_now(EventCode.DISARMED, "the device stays disarmed when it is back")
-                reply(True)
-            case _:
-                self.recovery.amend(replace(self.recovery.before, latched=False))
-                self._tell_now(EventCode.CLEARED, "fault cleared")
-                reply(True)
 
     def _publish_status(self) -> None:
         written = self.chronicle.recorder.written
