@@ -307,7 +307,8 @@ def _force_box(known: Known, status: Status, width: int, height: int) -> list[Te
     assert known.position is not None
     axes = _axes(status, known.position)
     titles = [f"{name} {value:+.2f}" for name, value in zip(axes, known.position.force_n, strict=False)]
-    limited = known.position.force_n != known.position.force_requested_n
+    # Without forces at all nothing is limited: the state in the first line says it.
+    limited = status.armed and known.position.force_n != known.position.force_requested_n
     styles = [_REQUESTED] * len(axes) + [_AXIS_STYLES[index % 3] for index in range(len(axes))]
     rows = plot(known.forces, width - 4, height - 2, styles, least=1.0, ruling=len(axes), marks=(0.0,))
     title = _coloured(titles, " N")

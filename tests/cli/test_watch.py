@@ -370,6 +370,15 @@ def test_a_latched_fault_says_how_to_go_on() -> None:
     assert "hapticd clear" in text
 
 
+@pytest.mark.parametrize("armed", [True, False])
+def test_a_force_is_shown_as_limited_only_where_forces_are_let_through(armed: bool) -> None:
+    known = Known()
+    applied_n = (12.0,) if armed else (0.0,)
+    known.take([Status(armed=armed, axes=("z",)), Position(0.0, 1, (-0.1,), (0.0,), applied_n, (300.0,))], 0.0)
+    text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
+    assert ("limited" in text) == armed
+
+
 def test_a_device_that_is_not_calibrated_says_what_it_waits_for() -> None:
     known = Known()
     known.take([Status(calibrated=False, law="tdpa")], 0.0)
