@@ -15,7 +15,7 @@ from statistics import median
 import pytest
 
 from hapticd.contracts.event import EventCode
-from tests.daemon.running import HAPTICD, Daemon, Subscriber, wait_until
+from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.daemon.test_commands import ask
 from tests.drivers.rig.hid_bench import SERIAL, HidDouble, build
 
@@ -87,10 +87,12 @@ def press(double: HidDouble, daemon: Daemon) -> None:
 
 
 def let_go_and_arm(double: HidDouble, daemon: Daemon) -> None:
+    """As a user would: whoever is told of a fault when he arms clears it and arms again."""
     double.set("hand_n", 0.0)
     double.set("x_m", START_M)
-    for word in ("clear", "arm"):
-        wait_until(lambda: ask(daemon, word).returncode == 0, word)  # noqa: B023 - called before the next word
+    end_s = time.monotonic() + PATIENCE_S
+    while any((told := ask(daemon, word)).returncode != 0 for word in ("clear", "arm")):
+        assert time.monotonic() < end_s, f"{told.args} was refused: {told.stderr} {daemon.output()}"
 
 
 def ticks_of(subscriber: Subscriber, faults: list[int]) -> Iterator[tuple[int, float]]:
@@ -128,24 +130,34 @@ def test_a_wall_holds_the_hand_and_the_rig_agrees_where(double: HidDouble, daemo
 
 def test_a_write_that_stalls_costs_the_loop_no_tick_and_the_rig_its_force(double: HidDouble, daemon: Daemon) -> None:
     """The loop ticks on, sees that nothing new comes from the rig, and lets go; it takes a user to go on."""
-    press(double, daemon)
-    with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
-        subscriber.until("hapticd/status")  # it is connected
-        double.tell("hold")
-        held = double.look().sequence
-        faults: list[int] = []
-        ticks = ticks_of(subscriber, faults)
-        for _ in range(STALLED_TICKS):
-            next(ticks)
-        assert double.look().sequence == held, "the write was not held"
-        double.set("hand_n", 0.0)
-        double.tell("release")
-        while not faults:
-            next(ticks)
-        assert set(faults) <= {EventCode.DEVICE_FROZEN, EventCode.DEVICE_LOST, EventCode.LOOP_LATE}
+    for _ in range(ATTEMPTS):
+        press(double, daemon)
+        with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
+            if subscriber.until("hapticd/status")["armed"]:  # it is connected, and hears of any fault from now on
+                stall(double, subscriber)
+                break
+        let_go_and_arm(double, daemon)  # this computer was so busy that the loop has let go by itself
+    else:
+        raise AssertionError(f"not armed after {ATTEMPTS} attempts: {daemon.output()}")
     wait_until(lambda: double.look().force_un == 0, "the rig to be without force")
     let_go_and_arm(double, daemon)
     press(double, daemon)
+
+
+def stall(double: HidDouble, subscriber: Subscriber) -> None:
+    """Hold a write up for as long as the loop takes to notice, and take the hand away meanwhile."""
+    double.tell("hold")
+    held = double.look().sequence
+    faults: list[int] = []
+    ticks = ticks_of(subscriber, faults)
+    while not faults:
+        next(ticks)
+    for _ in range(STALLED_TICKS):
+        next(ticks)
+    assert double.look().sequence == held, "the write was not held"
+    double.set("hand_n", 0.0)
+    double.tell("release")
+    assert set(faults) <= BUSY
 
 
 def test_an_unplugged_rig_is_lost_and_comes_back_with_its_wall(double: HidDouble, daemon: Daemon) -> None:

@@ -17,7 +17,7 @@
 
 #include "usb.h"
 
-enum { QUEUE = 64, FILLER = 0xff };
+enum { QUEUE = 64 };
 
 struct report {
     size_t length;
@@ -31,9 +31,8 @@ struct bed {
     struct usb *usb;
     int times_plugged; /* each time into another port, and as another hidraw */
     char hid[120], node[40], raw[160];
-    int device, client; /* both ends of the pseudo-terminal; the client's is only looked at */
+    int device, client; /* both ends of the pseudo-terminal; the client's is only looked at, and stopped */
     bool held;
-    size_t fillers, last_filler; /* reports with a number of their own hold the line; the last is short */
     bool odd; /* a report of another length than 64 is on the line */
     struct report queue[QUEUE];
     size_t first, count;
@@ -179,7 +178,7 @@ void bed_plug(struct bed *bed, const char *serial)
     check(umockdev_testbed_attach_ioctl(bed->testbed, bed->node, bed->handler, &error), "attach", error);
     check(umockdev_testbed_attach_ioctl(bed->testbed, usb_node, usb_handler(bed->usb), &error), "attach", error);
     bed->held = bed->odd = false;
-    bed->fillers = bed->count = bed->begun_length = 0;
+    bed->count = bed->begun_length = 0;
 }
 
 void bed_unplug(struct bed *bed)
@@ -204,39 +203,25 @@ void bed_unplug(struct bed *bed)
     bed->held = false;
 }
 
-/* How long what has begun will be, as far as that is known. */
-static size_t expected(const struct bed *bed)
-{
-    if (bed->begun_length == 0) {
-        return 1;
-    }
-    return bed->begun[0] == FILLER && bed->fillers == 0 ? bed->last_filler : OUTPUT_REPORT;
-}
-
 bool bed_receive(struct bed *bed, uint8_t report[OUTPUT_REPORT])
 {
     if (usb_claimed(bed->usb)) {
         report[0] = 0;
         return usb_receive(bed->usb, report + 1);
     }
-    while (!bed->held && bed->device >= 0) {
-        size_t missing = expected(bed) - bed->begun_length;
-        if (missing > 0) {
-            ssize_t length = read(bed->device, bed->begun + bed->begun_length, missing);
-            if (length <= 0) {
-                return false;
-            }
-            bed->begun_length += (size_t)length;
-            continue;
+    while (!bed->held && bed->device >= 0 && bed->begun_length < OUTPUT_REPORT) {
+        ssize_t length = read(bed->device, bed->begun + bed->begun_length, OUTPUT_REPORT - bed->begun_length);
+        if (length <= 0) {
+            return false;
         }
-        bed->begun_length = 0;
-        if (bed->begun[0] != FILLER) {
-            memcpy(report, bed->begun, OUTPUT_REPORT);
-            return true;
-        }
-        bed->fillers -= bed->fillers > 0; /* none left: that was the short one */
+        bed->begun_length += (size_t)length;
     }
-    return false;
+    if (bed->begun_length < OUTPUT_REPORT) {
+        return false;
+    }
+    bed->begun_length = 0;
+    memcpy(report, bed->begun, OUTPUT_REPORT);
+    return true;
 }
 
 void bed_send(struct bed *bed, const uint8_t *report, size_t length)
@@ -282,23 +267,12 @@ void bed_work(struct bed *bed)
 
 void bed_hold(struct bed *bed)
 {
-    uint8_t filler[OUTPUT_REPORT];
-    memset(filler, FILLER, sizeof filler);
     bed->held = true;
-    size_t written = 0;
-    for (int full = 0; full < 3; full++) { /* the kernel moves what has been written on, which makes room again */
-        ssize_t length;
-        while ((length = write(bed->client, filler, sizeof filler - written % sizeof filler)) > 0) {
-            written += (size_t)length;
-            full = 0;
-        }
-        usleep(2000);
-    }
-    bed->fillers = written / sizeof filler;
-    bed->last_filler = written % sizeof filler;
+    check(tcflow(bed->client, TCOOFF) == 0, "hold", NULL); /* a terminal that is stopped takes nothing */
 }
 
 void bed_release(struct bed *bed)
 {
     bed->held = false;
+    check(tcflow(bed->client, TCOON) == 0, "release", NULL);
 }
