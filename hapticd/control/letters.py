@@ -6,7 +6,6 @@ A new law or scene is built a slice a tick, in the time left before the next dea
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Generator
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
@@ -16,6 +15,7 @@ from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
 from hapticd.contracts.driver import DriverState
 from hapticd.contracts.errors import HapticdError
 from hapticd.contracts.event import EventCode
+from hapticd.control.beside import Beside
 from hapticd.control.contact import RunningLaw
 from hapticd.control.shared import DISARM, DISARMED
 from hapticd.guard import Mode
@@ -38,10 +38,25 @@ class Letters:
         self._loop = loop
         self._work: Generator[None, None, None] | None = None
         self._laws: dict[str, ModuleType] = {}
+        self._beside: Beside | None = None
+
+    def open(self) -> None:
+        """Be ready for work that goes on beside the loop; called by the loop's thread before its first tick."""
+        self._beside = Beside()
+
+    def close(self) -> None:
+        """The loop is over."""
+        if self._beside is not None:
+            self._beside.end()
 
     def know(self, name: str, law: ModuleType) -> None:
         """Remember an imported law, so that a switch to it imports nothing."""
         self._laws[name] = law
+
+    @property
+    def _aside(self) -> Beside:
+        assert self._beside is not None, "open() comes first"
+        return self._beside
 
     def work(self) -> None:
         """Do the next slice of the letter that waits; answer it when it is done."""
@@ -97,7 +112,7 @@ class Letters:
 
         words = loop.shared.words
         disarmed = words[DISARM]
-        threading.Thread(target=calibrate, daemon=True).start()
+        self._aside.do(calibrate)
         while not ended:
             if words[DISARM] != disarmed:
                 loop.driver.call_off()
@@ -154,7 +169,7 @@ class Letters:
     def _import(self, name: str) -> Generator[None, None, None]:
         """Import a law beside the loop; its ticks go on, late by the switch interval.
 
-        Where there is no bytecode of it yet, late by as long as Python takes to compile the source: some ms.
+        What holds the interpreter for longer makes them later, as the compiler does for a large law without bytecode.
         """
         ended: list[Exception | None] = []
 
@@ -167,7 +182,7 @@ class Letters:
 
         before_s = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
-        threading.Thread(target=load, daemon=True).start()
+        self._aside.do(load)
         while not ended:
             yield
         sys.setswitchinterval(before_s)

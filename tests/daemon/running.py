@@ -64,6 +64,7 @@ class Daemon:
                     os.kill(pid, signal.SIGCONT)
                     os.kill(pid, signal.SIGKILL)
         self.process.wait()
+        sys.stdout.write(self.output())  # pytest shows it with a test that fails
         self._notify.close()
         shutil.rmtree(self.directory, ignore_errors=True)
 
