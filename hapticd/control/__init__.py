@@ -1,1 +1,1 @@
-"""The control process: one thread, one tick a period, nothing in it that can wait but the device."""
+"""The control process: one thread ticks, once a period, and nothing in it can wait but the device."""

@@ -14,8 +14,6 @@ class Beside:
     To start a thread when it is needed takes milliseconds where memory is locked, since its whole stack is made at
     once. A busy computer would keep an ordinary thread from its work, and the loop with it whenever that thread holds
     the interpreter; and one of the loop's own priority would keep the loop from its processor.
-
-    Made by the loop's thread, once that is scheduled as it will be.
     """
 
     def __init__(self) -> None:
@@ -23,6 +21,9 @@ class Beside:
         self._ending = False
         self._gate = threading.Lock()  # open while there is something to do
         self._gate.acquire()
+
+    def start(self) -> None:
+        """Have the thread wait; called by the loop's thread, once that is scheduled as it will be."""
         thread = threading.Thread(target=self._run, name="beside-the-loop", daemon=True)
         thread.start()
         priority = os.sched_getparam(0).sched_priority - 1

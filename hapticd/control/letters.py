@@ -32,31 +32,20 @@ class Letters:
 
     Args:
         loop: the loop that they are for.
+
+    Attributes:
+        beside: what takes longer than a slice; started before the first letter.
     """
 
     def __init__(self, loop: ControlLoop) -> None:
         self._loop = loop
         self._work: Generator[None, None, None] | None = None
         self._laws: dict[str, ModuleType] = {}
-        self._beside: Beside | None = None
-
-    def open(self) -> None:
-        """Be ready for work that goes on beside the loop; called by the loop's thread before its first tick."""
-        self._beside = Beside()
-
-    def close(self) -> None:
-        """The loop is over."""
-        if self._beside is not None:
-            self._beside.end()
+        self.beside = Beside()
 
     def know(self, name: str, law: ModuleType) -> None:
         """Remember an imported law, so that a switch to it imports nothing."""
         self._laws[name] = law
-
-    @property
-    def _aside(self) -> Beside:
-        assert self._beside is not None, "open() comes first"
-        return self._beside
 
     def work(self) -> None:
         """Do the next slice of the letter that waits; answer it when it is done."""
@@ -112,7 +101,7 @@ class Letters:
 
         words = loop.shared.words
         disarmed = words[DISARM]
-        self._aside.do(calibrate)
+        self.beside.do(calibrate)
         while not ended:
             if words[DISARM] != disarmed:
                 loop.driver.call_off()
@@ -182,7 +171,7 @@ class Letters:
 
         before_s = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
-        self._aside.do(load)
+        self.beside.do(load)
         while not ended:
             yield
         sys.setswitchinterval(before_s)

@@ -122,7 +122,7 @@ class ControlLoop:
             DriverError: the device was lost.
         """
         try:
-            self.letters.open()
+            self.letters.beside.start()
             self._run()
         except DriverError as error:
             if isinstance(error, DeviceFaultError):
@@ -132,7 +132,7 @@ class ControlLoop:
             raise
         finally:
             self.driver.close()
-            self.letters.close()
+            self.letters.beside.end()
 
     def _start(self) -> None:
         """Find out where the device is, and arm it where that needs no one's word."""

@@ -31,7 +31,7 @@ class Bench:
         )
         for name in registry.names(registry.CONTROLLERS):
             self.loop.letters.know(name, registry.law(name))
-        self.loop.letters.open()
+        self.loop.letters.beside.start()
         self.tick.start(self.driver.read())
         self.events = EventReader(self.shared)
 
@@ -61,7 +61,7 @@ class Bench:
         return self.shared.words[MAIL] == self.shared.words[DONE]
 
     def close(self) -> None:
-        self.loop.letters.close()
+        self.loop.letters.beside.end()
         self.driver.close()
         self.shared.close()
 

@@ -33,6 +33,7 @@ def scheduled(beside: Beside) -> tuple[int, int]:
 def test_it_does_one_thing_after_the_other_and_ends() -> None:
     before = threads()
     beside = Beside()
+    beside.start()
     (thread,) = [each for each in threads() if each not in before]
     for _ in range(3):
         assert scheduled(beside) == (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)
@@ -44,6 +45,7 @@ def test_it_does_one_thing_after_the_other_and_ends() -> None:
 def test_it_ends_after_what_it_is_doing() -> None:
     before = threads()
     beside = Beside()
+    beside.start()
     (thread,) = [each for each in threads() if each not in before]
     begun, go_on, done = threading.Event(), threading.Event(), threading.Event()
 
@@ -70,6 +72,7 @@ def test_beside_a_real_time_loop_it_is_one_priority_below() -> None:
         except PermissionError:
             policy = os.sched_getscheduler(0)
         beside = Beside()
+        beside.start()
         found = scheduled(beside)
         beside.end()
         return (policy, max(0, os.sched_getparam(0).sched_priority - 1)), found

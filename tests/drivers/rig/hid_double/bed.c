@@ -209,15 +209,15 @@ bool bed_receive(struct bed *bed, uint8_t report[OUTPUT_REPORT])
         report[0] = 0;
         return usb_receive(bed->usb, report + 1);
     }
-    while (!bed->held && bed->device >= 0 && bed->begun_length < OUTPUT_REPORT) {
+    if (bed->held || bed->device < 0) {
+        return false;
+    }
+    while (bed->begun_length < OUTPUT_REPORT) {
         ssize_t length = read(bed->device, bed->begun + bed->begun_length, OUTPUT_REPORT - bed->begun_length);
         if (length <= 0) {
             return false;
         }
         bed->begun_length += (size_t)length;
-    }
-    if (bed->begun_length < OUTPUT_REPORT) {
-        return false;
     }
     bed->begun_length = 0;
     memcpy(report, bed->begun, OUTPUT_REPORT);
