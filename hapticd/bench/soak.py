@@ -12,16 +12,14 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
 
 from hapticd.bench import Bar, Progress, Quantiles
+from hapticd.bench.running import RunningDaemon, running_daemon
 from hapticd.client import Client, Event, Timing, connect
 from hapticd.config.loading import load
 from hapticd.contracts.errors import ConfigError, HapticdError
@@ -30,7 +28,6 @@ SILENCE_S = 30.0
 """How long nothing may come [s]."""
 
 STOPPED_S = 5.0
-END_TIMEOUT_S = 10.0
 MOST_GROWTH_KB = 512.0
 """Memory that a process may gain after its first look [kB]; a leak of one float a tick gains 86 MB in an hour."""
 
@@ -131,35 +128,25 @@ def measure(config: Path, duration_s: float, interval_s: float, progress: Progre
     loop, every_ticks = loaded.loop, loaded.telemetry.every_ticks
     if every_ticks != 1:
         raise ConfigError(f"{config}: telemetry.every_ticks = {every_ticks}: a soak counts every tick, so set it to 1")
-    with tempfile.TemporaryDirectory(prefix="hapticd-soak-") as directory, (Path(directory) / "log").open("w+") as log:
-        environment = os.environ | {"HAPTICD_RUNTIME_DIR": directory, "HAPTICD_STATE_DIR": directory}
-        command = [sys.executable, "-m", "hapticd", "run", "--config", str(config)]
-        daemon = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
-        try:
-            topics = (Timing, Event)
-            with connect(f"ipc://{directory}/default/telemetry", topics=topics, receive_high_water=0) as client:
-                faults: list[str] = []
-                looks = tuple(_looks(client, daemon, loop.period_ns, duration_s, interval_s, faults, progress, log))
-                dropped = client.status.ring_drops if client.status else 0
-        finally:
-            daemon.send_signal(signal.SIGTERM)
-            try:
-                daemon.wait(END_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                daemon.kill()
-                daemon.wait()
+    with (
+        tempfile.TemporaryDirectory(prefix="hapticd-soak-") as directory,
+        running_daemon(config, Path(directory)) as daemon,
+        connect(daemon.endpoint, topics=(Timing, Event), receive_high_water=0) as client,
+    ):
+        faults: list[str] = []
+        looks = tuple(_looks(client, daemon, loop.period_ns, duration_s, interval_s, faults, progress))
+        dropped = client.status.ring_drops if client.status else 0
     return Soak(loop.rate_hz, looks, dropped, tuple(faults), tuple(_bars(looks, dropped, len(faults))))
 
 
 def _looks(
     client: Client,
-    daemon: subprocess.Popen[bytes],
+    daemon: RunningDaemon,
     period_ns: int,
     duration_s: float,
     interval_s: float,
     faults: list[str],
     progress: Progress,
-    log: IO[str],
 ) -> Iterator[Look]:
     last: Timing | None = None
     first_ns = 0
@@ -170,9 +157,8 @@ def _looks(
     while True:
         records = client.receive(1.0)
         now_s = time.monotonic()
-        if daemon.poll() is not None or (not records and now_s > silent_s):
-            log.seek(0)
-            raise HapticdError(f"the daemon does not tick; it said:\n{log.read().rstrip()}")
+        if daemon.process.poll() is not None or (not records and now_s > silent_s):
+            raise daemon.failed("the daemon does not tick")
         if records:
             silent_s = now_s + SILENCE_S
         progress(now_s - told_s)
@@ -183,9 +169,9 @@ def _looks(
             if not isinstance(record, Timing):
                 continue
             if last is None:
-                daemon.send_signal(signal.SIGSTOP)
+                daemon.process.send_signal(signal.SIGSTOP)
                 time.sleep(STOPPED_S)
-                daemon.send_signal(signal.SIGCONT)
+                daemon.process.send_signal(signal.SIGCONT)
                 first_ns = record.deadline_ns + int(STOPPED_S * 1e9)
                 look_ns = first_ns + int(interval_s * 1e9)
             else:
@@ -198,7 +184,7 @@ def _looks(
             interval.late_us.append(record.late_us)
             if record.deadline_ns >= look_ns:
                 end_s = (record.deadline_ns - first_ns) * 1e-9
-                yield _look(end_s, interval, daemon.pid)
+                yield _look(end_s, interval, daemon.process.pid)
                 interval = _Interval()
                 look_ns += int(interval_s * 1e9)
                 if end_s >= duration_s:

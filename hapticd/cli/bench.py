@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from hapticd.cli.bench_switch import switch
 from hapticd.cli.output import make_console, measuring, print_bars, print_verdicts, quantile_cells, show, titled_table
 from hapticd.cli.rig import rig
 from hapticd.cli.soak import soak
@@ -27,6 +28,7 @@ _JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 app.command()(rig)
 app.command()(soak)
+app.command()(switch)
 
 
 @app.callback(invoke_without_command=True)
