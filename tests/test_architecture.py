@@ -15,7 +15,18 @@ import pytest
 ROOT = Path(__file__).parent.parent
 SOURCES = sorted(
     path
-    for folder in ("hapticd", "drivers", "controllers", "tests", "docs", "config", "systemd", ".ci")
+    for folder in (
+        "hapticd",
+        "drivers",
+        "controllers",
+        "studies",
+        "benchmarks",
+        "tests",
+        "docs",
+        "config",
+        "systemd",
+        ".ci",
+    )
     for path in (ROOT / folder).rglob("*")
     if path.is_file() and "__pycache__" not in path.parts and path != Path(__file__)
 )
@@ -83,9 +94,9 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site-packages"
 
 
-def test_the_wheel_holds_three_packages_and_nothing_called_drivers(installed: Path) -> None:
+def test_the_wheel_holds_five_packages_and_nothing_called_drivers(installed: Path) -> None:
     packages = {path.name for path in installed.iterdir() if path.suffix != ".dist-info"}
-    assert packages == {"hapticd", "hapticd_controllers", "hapticd_drivers"}
+    assert packages == {"hapticd", "hapticd_bench", "hapticd_controllers", "hapticd_drivers", "hapticd_studies"}
 
 
 def test_the_wheel_holds_every_shipped_configuration(installed: Path) -> None:
@@ -96,10 +107,10 @@ def test_the_wheel_holds_every_shipped_configuration(installed: Path) -> None:
 def test_an_installed_hapticd_finds_its_own_configuration_and_plugins(installed: Path, tmp_path: Path) -> None:
     """Run from the unpacked wheel, whose modules come before those of the checkout."""
     script = (
-        "import hapticd, hapticd_drivers, hapticd.share as share\n"
+        "import hapticd, hapticd_drivers, hapticd.paths as paths\n"
         "from hapticd.cli import main\n"
-        "print(hapticd.__file__, hapticd_drivers.__file__, share.directory('config'), sep='\\n', flush=True)\n"
-        "main(['check', str(share.directory('config') / 'hapticd.toml')])\n"
+        "print(hapticd.__file__, hapticd_drivers.__file__, paths.directory('config'), sep='\\n', flush=True)\n"
+        "main(['check', str(paths.directory('config') / 'hapticd.toml')])\n"
     )
     done = run(sys.executable, "-c", script, cwd=tmp_path, PYTHONPATH=str(installed))
     assert done.returncode == 0, done.stderr

@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from hapticd.contracts.law import LawParams
-from hapticd.energy import CycleFields, cycle_ended
+from hapticd.law import LawParams
+from hapticd.tick.energy import CycleFields, cycle_ended
 
 WORK_SPRING, WORK_TOTAL = range(2)
 PAIRING_EXACT, PAIRING_NEW_FORCE, PAIRING_POWER, PAIRING_HELD_POWER = range(4)

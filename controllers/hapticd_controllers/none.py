@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 
 
 class Params(LawParams):

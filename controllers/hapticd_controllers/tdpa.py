@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 
 OBSERVER_EXACT, OBSERVER_PRINTED = range(2)
 RESET_CONTACT, RESET_NEVER = range(2)

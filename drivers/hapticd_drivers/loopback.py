@@ -1,129 +1,18 @@
-"""A simulated device as a driver: the model that the studies use, one period per tick."""
+"""The loopback: a simulated device in the place of a real one, always there and never dangerous."""
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Sequence
-
-from hapticd.contracts.device import DeviceInfo, FoundDevice
-from hapticd.contracts.driver import Driver
-from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError
-from hapticd.contracts.sample import Sample
-from hapticd.simulation.device import SimulatedDevice
+from hapticd.device import FoundDevice
+from hapticd.simulation.driver import SimulatedDriver
 from hapticd.simulation.options import SimulationOptions
 
-FARTHEST_M = 1e6
-"""A model that has gone this far from its wall has diverged [m]."""
 
-MOST_CATCH_UP_S = 1.0
-"""clock = "wall": a host that was stopped for longer makes up for this much [s]."""
+class Loopback(SimulatedDriver):
+    """The simulated one-axis device of `hapticd.simulation`."""
 
-
-class Loopback(Driver[SimulationOptions]):
-    """A simulated one-axis device.
-
-    With `clock = "ticks"` every read but the first advances the model by one period, with the force written
-    last, so that results do not depend on the host's scheduling; device time counts the same periods.
-    """
-
-    Options = SimulationOptions
-
-    def __init__(self, options: SimulationOptions, period_s: float) -> None:
-        super().__init__(options, period_s)
-        self._wall_m = 0.0
-        self._outward = 1.0
-        self._period_ns = round(period_s * 1e9)
-        self._now_ns = time.monotonic_ns
-        self._sample = Sample(1)
-        self._device: SimulatedDevice | None = None
-        self._force_n = 0.0
-        self._first = True
-        self._started_ns = 0
+    NAME = "loopback"
 
     @classmethod
     def find(cls, options: SimulationOptions | None = None) -> list[FoundDevice]:
         """The model, which is always there."""
         return [FoundDevice(f"{(options or cls.Options()).model} model, simulated", "")]
-
-    def place(self, wall_m: float, outward: int) -> None:
-        """Start relative to this wall."""
-        self._wall_m = wall_m
-        self._outward = float(outward)
-
-    def _open(self) -> DeviceInfo:
-        try:
-            self._device = SimulatedDevice(self.options, self.period_s)
-        except ValueError as error:
-            raise DeviceProtocolError(f"loopback: device.options.{error}") from error
-        self._force_n = 0.0
-        self._first = True
-        options = self.options
-        return DeviceInfo(
-            model=f"loopback ({options.model} model)",
-            serial="",
-            axes=("x",),
-            max_force_n=options.max_force_n or math.inf,
-            resolution_m=options.resolution_m,
-            workspace_m=((self._wall_m - FARTHEST_M, self._wall_m + FARTHEST_M),),
-            nominal_rate_hz=1.0 / self.period_s,
-            safe_damping_n_s_per_m=_safe_damping(options, self.period_s),
-            host_silence_ms=0.0,
-            simulated=True,
-            has_clock=True,
-            has_sequence=True,
-        )
-
-    def _enable(self) -> None:
-        self._force_n = 0.0
-
-    def _read(self) -> Sample:
-        device = self._device
-        assert device is not None
-        if self._first:
-            self._first = False
-            self._started_ns = self._now_ns()
-        elif self.options.clock == "ticks":
-            device.advance(self._force_n)
-        else:
-            self._catch_up(device)
-        x_m = device.measured_m
-        if not -FARTHEST_M < x_m < FARTHEST_M:
-            raise DeviceFaultError(f"loopback: the model has diverged after {device.ticks * self.period_s:g} s")
-        sample = self._sample
-        sample.position_m[0] = self._wall_m + self._outward * x_m
-        sample.time_ns = device.ticks * self._period_ns
-        sample.sequence = device.ticks
-        return sample
-
-    def _write(self, force_n: Sequence[float]) -> None:
-        self._force_n = self._outward * force_n[0]
-
-    def _disable(self) -> None:
-        self._force_n = 0.0
-
-    def _close(self) -> None:
-        self._device = None
-
-    def _catch_up(self, device: SimulatedDevice) -> None:
-        due = (self._now_ns() - self._started_ns) // self._period_ns
-        most = max(1, round(MOST_CATCH_UP_S / self.period_s))
-        if due - device.ticks > most:
-            self._started_ns += (due - device.ticks - most) * self._period_ns
-            due = device.ticks + most
-        while device.ticks < due:
-            device.advance(self._force_n)
-
-
-def _safe_damping(options: SimulationOptions, period_s: float) -> float:
-    """Digital damping that holds the bare device: about half of what would shake it, or less.
-
-    A damper on the difference of two samples is stable below 2, 0.83, 0.54, 0.40 m / T with 0, 1, 2, 3 samples of
-    delay; 0.75 / (1 + delay) stays under half of each, and 0.41 m / T under half of the second, should one sample of
-    delay be there undeclared. A slow actuator counts as delay. The hand is left out: it may let go.
-    """
-    delay = float(options.force_delay_samples)
-    if options.bandwidth_hz > 0.0:
-        delay += 1.0 / (2.0 * math.pi * options.bandwidth_hz * period_s)
-    mass_kg = min([options.mass_kg, *(change.mass_kg for change in options.changes if change.mass_kg is not None)])
-    return min(0.41, 0.75 / (1.0 + delay)) * mass_kg / period_s

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hapticd.contracts.errors import HapticdError
+from hapticd.errors import HapticdError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,7 @@ def _run(arguments: list[str]) -> int:
         # These take so long that an interrupt may well come meanwhile.
         import typer
 
-        from hapticd.cli.overview import application
+        from hapticd.cli.app import application
 
         wanted = next((argument for argument in arguments if not argument.startswith("-")), None)
         command = typer.main.get_command(application(wanted))

@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from hapticd.config.loading import load
-from hapticd.contracts.errors import ConfigError
-from hapticd.control.fitting import fit
-from hapticd.keys.access import key_ring
+from hapticd.errors import ConfigError
+from hapticd.keys.policy import key_ring
+from hapticd.offline.model_choice import fit
 
 
 def check(

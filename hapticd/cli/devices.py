@@ -14,15 +14,15 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from hapticd import lookup, registry
-from hapticd.cli import catalogue
+from hapticd import discovery, plugins
 from hapticd.cli.doctor import folded
+from hapticd.cli.plugins import describe_plugins, show_plugins
 from hapticd.config.loading import load
-from hapticd.contracts.driver import DriverOptions
-from hapticd.contracts.errors import ConfigError
+from hapticd.discovery import Discovery
 from hapticd.doctor.finding import for_this_user
-from hapticd.lookup import Lookup
-from hapticd.share import default_config
+from hapticd.driver import DriverOptions
+from hapticd.errors import ConfigError
+from hapticd.paths import default_config
 
 _HEAD = ("driver", "device", "serial", "where", "state")
 _STYLES = {"ready": "green", "usable": "yellow", "cannot be used": "bold red"}
@@ -52,12 +52,12 @@ def devices(
 
     Example: hapticd devices omega7
     """
-    plugins = catalogue.installed(registry.DRIVERS, name, registry.driver, lambda driver: driver.Options)
+    drivers = describe_plugins(plugins.DRIVERS, name, plugins.driver, lambda driver: driver.Options)
     configured, options = _configured(config)
-    wanted = {plugin.name: options if plugin.name == configured else None for plugin in plugins if not plugin.problem}
-    looked = {one.driver: one for one in lookup.look(wanted)}
+    wanted = {plugin.name: options if plugin.name == configured else None for plugin in drivers if not plugin.problem}
+    looked = {one.driver: one for one in discovery.look(wanted)}
     if as_json:
-        found = [looked.get(plugin.name, Lookup(plugin.name, problem=plugin.problem)) for plugin in plugins]
+        found = [looked.get(plugin.name, Discovery(plugin.name, problem=plugin.problem)) for plugin in drivers]
         rows = [
             {
                 **asdict(plugin),
@@ -65,7 +65,7 @@ def devices(
                 "devices": [asdict(device) for device in one.devices],
                 "diagnoses": [asdict(diagnosis) for diagnosis in one.diagnoses],
             }
-            for plugin, one in zip(plugins, found, strict=True)
+            for plugin, one in zip(drivers, found, strict=True)
         ]
         typer.echo(json.dumps(rows, indent=2, default=str))
         return
@@ -73,15 +73,15 @@ def devices(
     _show(
         console,
         [
-            looked.get(plugin.name, Lookup(plugin.name, problem=f"cannot be used: {plugin.problem}"))
-            for plugin in plugins
+            looked.get(plugin.name, Discovery(plugin.name, problem=f"cannot be used: {plugin.problem}"))
+            for plugin in drivers
         ],
     )
     console.print()
     if name is None:
         console.print("hapticd devices NAME lists the options of a driver.", style="dim")
     else:
-        catalogue.show(plugins, "device.options", False)
+        show_plugins(drivers, "device.options", False)
 
 
 def _configured(config: Path | None) -> tuple[str, DriverOptions | None]:
@@ -95,7 +95,7 @@ def _configured(config: Path | None) -> tuple[str, DriverOptions | None]:
     return loaded.config.device.driver, loaded.options
 
 
-def _show(console: Console, looked: Sequence[Lookup]) -> None:
+def _show(console: Console, looked: Sequence[Discovery]) -> None:
     """A line a device, what is to be known of it below, and a line for a driver that found none."""
     lines = list(chain.from_iterable(map(_lines, looked)))
     rows = [_HEAD, *(row for row, _ in lines)]
@@ -115,7 +115,7 @@ def _show(console: Console, looked: Sequence[Lookup]) -> None:
                     console.print(Text(" " * _INDENT + line, style), soft_wrap=True)
 
 
-def _lines(looked: Lookup) -> Iterator[tuple[Row, tuple[Details, ...]]]:
+def _lines(looked: Discovery) -> Iterator[tuple[Row, tuple[Details, ...]]]:
     for device in looked.devices:
         state = "cannot be used" if device.problem else "usable" if device.note else "ready"
         told: list[Details] = [(device.problem, device.mend), (device.note, ())]

@@ -20,10 +20,9 @@ from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.examination import SCHEMA, Examination, verdict
 from hapticd.doctor.finding import Finding, Mark
 from hapticd.doctor.latency import Latency
+from hapticd.paths import DEFAULT_INSTANCE, default_config, runtime_directory
 from hapticd.progress import progress_bar
-from hapticd.share import default_config
-from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, runtime_directory
-from hapticd.telemetry.status import LATE_EDGES_US
+from hapticd.telemetry.records import LATE_EDGES_US
 
 _STYLES: dict[Mark, str] = {"ok": "green", "advice": "yellow", "problem": "bold red", "unknown": "cyan"}
 _COUNTED = {"problem": "problems", "advice": "advice", "unknown": "could not tell", "ok": "ok"}

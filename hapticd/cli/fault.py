@@ -13,14 +13,12 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from hapticd.cli.trace import LABEL_WIDTH, SLICE_S, Trace, plot
-from hapticd.contracts.errors import HapticdError
+from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, Trace, plot
+from hapticd.errors import HapticdError
 from hapticd.faults.export import write_csv
-from hapticd.faults.file import FaultRecord, read, read_header
-from hapticd.faults.place import fault_directories
+from hapticd.faults.record import FaultRecord, FaultSummary, read, read_header, summarise
 from hapticd.faults.store import FaultStore
-from hapticd.faults.summary import Summary, summarise
-from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
+from hapticd.paths import DEFAULT_INSTANCE, fault_directories
 
 app = typer.Typer(
     help="List, show or export the records of faults.",
@@ -145,7 +143,7 @@ def _find(name: str | None, instance: str, directory: Path | None) -> Path:
     return matching[0]
 
 
-def _lines(record: FaultRecord, summary: Summary) -> list[str]:
+def _lines(record: FaultRecord, summary: FaultSummary) -> list[str]:
     header = record.header
     event = header["event"]
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(event["timestamp"]))

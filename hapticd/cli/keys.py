@@ -10,9 +10,9 @@ from typing import Annotated
 
 import typer
 
-from hapticd.contracts.errors import ConfigError
-from hapticd.keys.directory import SECRET, KeyDirectory, key_directory
+from hapticd.errors import ConfigError
 from hapticd.keys.file import Key, is_key, new_pair, read, write, written
+from hapticd.keys.store import SECRET, KeyDirectory, key_directory
 
 app = typer.Typer(
     help="Say who may reach this computer's daemons from another one.",

@@ -11,8 +11,7 @@ from typing import Annotated
 import typer
 
 from hapticd.config.loading import load
-from hapticd.share import default_config
-from hapticd.telemetry.endpoint import DEFAULT_INSTANCE
+from hapticd.paths import DEFAULT_INSTANCE, default_config
 
 
 def run(
@@ -32,11 +31,11 @@ def run(
     path = config or default_config()
     loaded = load(path)
     if watch:
-        from hapticd.cli.watched import run_watched
+        from hapticd.cli.watch.attached import run_watched
 
         raise typer.Exit(run_watched(path, instance))
-    from hapticd.supervisor.journal import log_handler
-    from hapticd.supervisor.service import Service
+    from hapticd.supervisor.daemon import Daemon
+    from hapticd.supervisor.systemd import log_handler
 
     # Written by a thread: a terminal that is stopped (Ctrl-S) or cut off must not stop the supervisor.
     lines: SimpleQueue[logging.LogRecord] = SimpleQueue()
@@ -44,6 +43,6 @@ def run(
     logging.basicConfig(level=logging.INFO, format="%(message)s", handlers=[QueueHandler(lines)])
     writer.start()
     try:
-        raise typer.Exit(Service(loaded, instance).run())
+        raise typer.Exit(Daemon(loaded, instance).run())
     finally:
         writer.stop()

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hapticd.installation import Installation, systemd_runs, unit_states
+from hapticd.service.install import Installation, systemd_runs, unit_states
 
 app = typer.Typer(
     help="Install the daemon as a service, look at it, remove it.",

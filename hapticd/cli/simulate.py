@@ -12,10 +12,10 @@ from typing import Annotated
 import typer
 
 from hapticd.config.loading import load
-from hapticd.contracts.errors import HapticdError
+from hapticd.errors import HapticdError
+from hapticd.offline.run import OfflineRun, Row, Summary
+from hapticd.offline.traces import open_trace
 from hapticd.progress import progress_bar
-from hapticd.study.offline import OfflineRun, Row, Summary
-from hapticd.study.traces import open_trace
 
 
 def simulate(

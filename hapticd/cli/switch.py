@@ -10,15 +10,14 @@ from typing import Annotated, Any
 
 import typer
 
-from hapticd.cli.destination import Instance
-from hapticd.commander import RefusedConfigError, command
+from hapticd.cli.remote import Instance
+from hapticd.client.commands import RefusedConfigError, command
 from hapticd.config.editing import with_law
 from hapticd.config.file import read, replace
 from hapticd.config.models import ControllerConfig
 from hapticd.config.problems import shown_value
-from hapticd.contracts.errors import ConfigError, InstanceError
-from hapticd.share import SYSTEM_CONFIG
-from hapticd.telemetry.endpoint import CONTROL, DEFAULT_INSTANCE, locate
+from hapticd.errors import ConfigError, InstanceError
+from hapticd.paths import CONTROL, DEFAULT_INSTANCE, SYSTEM_CONFIG, locate
 
 
 def switch(

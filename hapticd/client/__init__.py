@@ -10,11 +10,10 @@ The contract behind it is docs/telemetry.md; any language with ZeroMQ and msgpac
 """
 
 from hapticd.client.connection import Client, connect
-from hapticd.client.decoding import decode
-from hapticd.client.errors import ClientError, SchemaError, SilenceError, WireError
-from hapticd.client.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Timing
-from hapticd.keys.visit import RefusedKeyError
-from hapticd.telemetry.status import Status
+from hapticd.client.decode import decode
+from hapticd.errors import ClientError, SchemaError, SilenceError, WireError
+from hapticd.keys.client import RefusedKeyError
+from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Status, Timing
 
 __all__ = [
     "Client",

@@ -10,13 +10,12 @@ from typing import Any
 
 import zmq
 
-from hapticd.client.decoding import decode
-from hapticd.client.errors import ClientError, SchemaError, SilenceError, WireError
-from hapticd.client.records import Gap, Record, Sent
+from hapticd.client.decode import decode
+from hapticd.errors import ClientError, SchemaError, SilenceError, WireError
+from hapticd.keys.client import CurveClient, client_keys
 from hapticd.keys.file import Key
-from hapticd.keys.visit import Visit, client_keys
-from hapticd.telemetry.endpoint import DEFAULT_INSTANCE, telemetry_endpoint
-from hapticd.telemetry.status import Status
+from hapticd.paths import DEFAULT_INSTANCE, telemetry_endpoint
+from hapticd.telemetry.records import Gap, Record, Sent, Status
 from hapticd.telemetry.wire import SCHEMA, Topic
 
 _EVERY_TICK = (Topic.POSITION, Topic.ENERGY, Topic.DAMPING, Topic.TIMING)
@@ -77,7 +76,7 @@ class Client:
         self._last: dict[Topic, int] = {}
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.SUB)
-        self._visit = Visit(self._socket, endpoint, keys)
+        self._visit = CurveClient(self._socket, endpoint, keys)
         try:
             self._socket.setsockopt(zmq.LINGER, 0)
             self._socket.setsockopt(zmq.RCVHWM, receive_high_water)

@@ -11,7 +11,7 @@ from tomlkit.items import Comment, InlineTable, Null, Table, Whitespace
 
 from hapticd.config.loading import parse
 from hapticd.config.models import ControllerConfig
-from hapticd.contracts.errors import ConfigError
+from hapticd.errors import ConfigError
 
 _BOM = "\ufeff"
 

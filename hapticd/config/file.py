@@ -9,7 +9,7 @@ import stat
 import tempfile
 from pathlib import Path
 
-from hapticd.contracts.errors import ConfigError
+from hapticd.errors import ConfigError
 
 _LARGEST = 1 << 20
 

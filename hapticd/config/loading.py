@@ -11,14 +11,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
-from hapticd import registry
+from hapticd import plugins
 from hapticd.config.file import read
 from hapticd.config.models import Config, ControllerConfig, DeviceConfig
 from hapticd.config.problems import Problems, nearest
-from hapticd.contracts.driver import Driver, DriverOptions
-from hapticd.contracts.errors import ConfigError, PluginError
-from hapticd.contracts.law import LawParams
-from hapticd.contracts.table import Table
+from hapticd.driver import Driver, DriverOptions
+from hapticd.errors import ConfigError, PluginError
+from hapticd.law import LawParams
+from hapticd.settings import Table
 
 PluginT = TypeVar("PluginT")
 TableT = TypeVar("TableT", bound=Table)
@@ -88,9 +88,9 @@ def parse(text: str, name: str) -> LoadedConfig:
     law, params = _law(problems, data)
     if config is not None:
         _check_together(problems, config)
-        if options is not None:
+        if driver is not None and options is not None:
             try:
-                options.check_at(config.loop.period_s)
+                driver.check(options, config.loop.period_s)
             except ValueError as error:
                 problems.add(("device", "options"), str(error))
     if problems.lines or config is None or driver is None or options is None or law is None or params is None:
@@ -116,7 +116,7 @@ def _toml(text: str, name: str) -> dict[str, Any]:
 def _driver(problems: Problems, data: dict[str, Any]) -> tuple[type[Driver[Any]] | None, DriverOptions | None]:
     device = data.get("device", {})
     default = DeviceConfig().driver
-    driver = _plugin(problems, device, ("device", "driver"), default, registry.DRIVERS, registry.driver)
+    driver = _plugin(problems, device, ("device", "driver"), default, plugins.DRIVERS, plugins.driver)
     if driver is None:
         return None, None
     options = device.get("options", {})
@@ -128,7 +128,7 @@ def _driver(problems: Problems, data: dict[str, Any]) -> tuple[type[Driver[Any]]
 def _law(problems: Problems, data: dict[str, Any]) -> tuple[ModuleType | None, LawParams | None]:
     controller = data.get("controller", {})
     default = ControllerConfig().law
-    law = _plugin(problems, controller, ("controller", "law"), default, registry.CONTROLLERS, registry.law)
+    law = _plugin(problems, controller, ("controller", "law"), default, plugins.CONTROLLERS, plugins.law)
     if law is None:
         return None, None
     params = controller.get("params", {})
@@ -158,10 +158,10 @@ def _plugin(
     name = table.get(key[1], default) if isinstance(table, dict) else None
     if not isinstance(name, str) or not name:  # already reported
         return None
-    installed = registry.names(group)
-    own_module = group == registry.CONTROLLERS and "." in name
+    installed = plugins.names(group)
+    own_module = group == plugins.CONTROLLERS and "." in name
     if name not in installed and not own_module:
-        own = "; a module of your own is named package.module" if group == registry.CONTROLLERS else ""
+        own = "; a module of your own is named package.module" if group == plugins.CONTROLLERS else ""
         problems.add(key, f"not installed{own}; {nearest(name, installed)}", name)
         return None
     if own_module and not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)+", name):

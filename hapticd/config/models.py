@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from hapticd.contracts.table import Table
+from hapticd.settings import Table
 
 MAX_WALLS = 8
 """Most walls in a scene: the size of a tick record is fixed when the ring is made."""

@@ -7,9 +7,9 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from hapticd import registry
+from hapticd import plugins
 from hapticd.config.models import Config
-from hapticd.contracts.errors import PluginError
+from hapticd.errors import PluginError
 
 
 def json_schema() -> dict[str, Any]:
@@ -19,26 +19,26 @@ def json_schema() -> dict[str, Any]:
     `controller.params` follow the driver and the law that the file names.
     """
     drivers: dict[str, type[BaseModel]] = {}
-    for name in registry.names(registry.DRIVERS):
+    for name in plugins.names(plugins.DRIVERS):
         try:
-            drivers[name] = registry.driver(name).Options
+            drivers[name] = plugins.driver(name).Options
         except PluginError:
             continue  # `hapticd devices` says why
     laws: dict[str, type[BaseModel]] = {}
-    for name in registry.names(registry.CONTROLLERS):
+    for name in plugins.names(plugins.CONTROLLERS):
         try:
-            laws[name] = registry.law(name).Params
+            laws[name] = plugins.law(name).Params
         except PluginError:
             continue  # `hapticd controllers` says why
     models: set[type[BaseModel]] = {Config, *drivers.values(), *laws.values()}
     references, schema = models_json_schema([(model, "validation") for model in models])
     definitions: dict[str, Any] = schema["$defs"]
     config: dict[str, Any] = definitions.pop("Config")
-    for kind, plugins, table, key, choice in (
+    for kind, models_of, table, key, choice in (
         ("driver", drivers, "DeviceConfig", "options", "driver"),
         ("law", laws, "ControllerConfig", "params", "law"),
     ):
-        for name, model in plugins.items():
+        for name, model in models_of.items():
             definitions[f"{kind}.{name}"] = references[model, "validation"]
         default = definitions[table]["properties"][choice]["default"]
         definitions[table]["allOf"] = [
@@ -46,7 +46,7 @@ def json_schema() -> dict[str, Any]:
                 "if": {"properties": {choice: {"const": name}}, **({} if name == default else {"required": [choice]})},
                 "then": {"properties": {key: {"$ref": f"#/$defs/{kind}.{name}"}}},
             }
-            for name in plugins
+            for name in models_of
         ]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass
 
-from hapticd.contracts.errors import HapticdError
+from hapticd.errors import HapticdError
 
 _TIMEOUT_S = 30.0
 
@@ -43,7 +43,7 @@ def attempt(priority: int) -> Attempt:
 
 def main() -> None:
     """Try, and print how it went."""
-    import hapticd.control.process  # noqa: F401 - the limit counts all memory of a process, so be as large
+    import hapticd.loop.process  # noqa: F401 - the limit counts all memory of a process, so be as large
 
     libc = ctypes.CDLL(None, use_errno=True)
     memory = ctypes.get_errno() if libc.mlockall(1 | 2) else 0

@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from hapticd.config.file import read
 from hapticd.config.loading import LoadedConfig, load
 from hapticd.config.models import Config, DeviceConfig, LoopConfig
-from hapticd.contracts.errors import ConfigError
 from hapticd.doctor.finding import Finding, ok, problem
-from hapticd.keys.access import tcp_endpoints
-from hapticd.share import directory
+from hapticd.errors import ConfigError
+from hapticd.keys.policy import tcp_endpoints
+from hapticd.paths import directory
 
 
 @dataclass(frozen=True, slots=True)

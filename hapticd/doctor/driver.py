@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import inspect
 
-from hapticd import registry
-from hapticd.contracts.device import FoundDevice
-from hapticd.contracts.driver import Driver
+from hapticd import plugins
+from hapticd.device import FoundDevice
+from hapticd.discovery import Discovery
 from hapticd.doctor.finding import Finding, ok, own_command, problem, unknown
-from hapticd.lookup import Lookup
+from hapticd.driver import Driver
 
 
-def needs(looked: Lookup) -> list[Finding]:
+def needs(looked: Discovery) -> list[Finding]:
     """What it has and lacks.
 
     Args:
@@ -23,7 +23,7 @@ def needs(looked: Lookup) -> list[Finding]:
     return found or [ok(f"{looked.driver} needs nothing that is not there")]
 
 
-def devices(looked: Lookup, daemon: int) -> list[Finding]:
+def devices(looked: Discovery, daemon: int) -> list[Finding]:
     """Which devices it finds, and whether this user can use one.
 
     Args:
@@ -38,7 +38,7 @@ def devices(looked: Lookup, daemon: int) -> list[Finding]:
         return [_state(device, name, usable) for device in looked.devices]
     if looked.problem:
         return [unknown(f"{name} did not look")]
-    if inspect.getattr_static(registry.driver(name), "find") is vars(Driver)["find"]:
+    if inspect.getattr_static(plugins.driver(name), "find") is vars(Driver)["find"]:
         return [unknown(f"{name} cannot look for its devices")]
     return [problem(f"{name} finds no device", f"# {looked.absent}")]
 

@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from hapticd.contracts.errors import ConfigError
 from hapticd.doctor.finding import Finding, advice, ok, own_command, problem
 from hapticd.doctor.tree import ROOT, read, read_if_there
-from hapticd.keys.access import stays_here, takes_keys
-from hapticd.keys.directory import KeyDirectory
-from hapticd.telemetry.endpoint import CONTROL, TELEMETRY
+from hapticd.errors import ConfigError
+from hapticd.keys.policy import stays_here, takes_keys
+from hapticd.keys.store import KeyDirectory
+from hapticd.paths import CONTROL, TELEMETRY
 
 _LONGEST_SOCKET = 107
 _ENOUGH = 500 * 2**20

@@ -7,16 +7,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from hapticd import lookup
+from hapticd import discovery
 from hapticd.doctor import configuration, driver, endpoints, kernel, memory, processor, rules, scheduling, usb
 from hapticd.doctor.attempt import attempt
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.finding import Check, Finding, Mark, examine, ok
 from hapticd.doctor.latency import Latency, judge, measure
 from hapticd.doctor.tree import ROOT
-from hapticd.faults.place import fault_directory
-from hapticd.keys.directory import KeyDirectory, key_directory
-from hapticd.telemetry.endpoint import runtime_directory
+from hapticd.keys.store import KeyDirectory, key_directory
+from hapticd.paths import fault_directory, runtime_directory
 
 SCHEMA = 1
 """Version of what `--json` prints."""
@@ -48,7 +47,7 @@ class Examination:
         tried = functools.cache(lambda: attempt(loop.priority))
         daemon = functools.cache(lambda: endpoints.running(directory, root))
         # The daemon's device would only be shown as held, and looking for it might disturb the loop.
-        looked = functools.cache(lambda: lookup.look({name: options}, find=not _or_none(daemon))[0])
+        looked = functools.cache(lambda: discovery.look({name: options}, find=not _or_none(daemon))[0])
         faults = fault_directory(self.instance)
         return [
             Check("kernel.preemption", "kernel", lambda: kernel.preemption(root)),

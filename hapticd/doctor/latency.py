@@ -16,13 +16,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hapticd.bench import Quantiles, Watch
 from hapticd.config.models import LoopConfig
-from hapticd.contracts.errors import HapticdError
 from hapticd.doctor.finding import Finding, advice, ok, own_command, problem
 from hapticd.doctor.processor import is_virtual
 from hapticd.doctor.tree import ROOT
-from hapticd.telemetry.status import LateHistogram
+from hapticd.errors import HapticdError
+from hapticd.measure import MachineWatch, Quantiles
+from hapticd.telemetry.records import LateHistogram
 
 GOOD_LATE = 0.1
 """Share of the period that p99 of lateness may take in a good loop."""
@@ -87,7 +87,7 @@ def measure(
     Raises:
         HapticdError: the child did not run.
     """
-    machine = Watch()
+    machine = MachineWatch()
     command = [sys.executable, "-m", "hapticd.doctor.sleeper", str(os.getpid()), loop.model_dump_json(), str(seconds)]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     started_s = time.monotonic()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hapticd.doctor.finding import Finding, advice, ok, own_command
 from hapticd.doctor.tree import ROOT, read
-from hapticd.share import directory
+from hapticd.paths import directory
 
 _PLACES = ("etc/udev/rules.d", "usr/local/lib/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d")
 

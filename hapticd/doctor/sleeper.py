@@ -12,7 +12,7 @@ from array import array
 from typing import Any
 
 from hapticd.config.models import LoopConfig
-from hapticd.control.realtime import become_realtime, die_with_parent, sleep_until
+from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
 
 
 def main() -> None:

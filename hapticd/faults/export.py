@@ -7,8 +7,8 @@ import dataclasses
 from collections.abc import Iterator
 from typing import TextIO
 
-from hapticd.contracts.record import TickRecord, WallRecord
-from hapticd.faults.file import FaultRecord
+from hapticd.faults.record import FaultRecord
+from hapticd.tick.record import TickRecord, WallRecord
 
 _WALLS = "walls"
 _WALL_FIELDS = [field.name for field in dataclasses.fields(WallRecord)]

@@ -7,8 +7,8 @@ import os
 import time
 from pathlib import Path
 
-from hapticd.contracts.errors import HapticdError
-from hapticd.faults.file import SUFFIX
+from hapticd.errors import HapticdError
+from hapticd.faults.record import SUFFIX
 
 _UNFINISHED = ".part"
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import zmq
 from zmq.utils import z85
 
-from hapticd.contracts.errors import ConfigError, HapticdError
+from hapticd.errors import ConfigError, HapticdError
 
 _LARGEST_FILE = 1 << 14
 _ENTRY = re.compile(r"\s*([a-z-]+)\s*=\s*[\"']?(.*?)[\"']?\s*")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.options import SimulationOptions
 from hapticd.simulation.plant import (
     Buffers,
@@ -17,7 +18,6 @@ from hapticd.simulation.plant import (
     start_state,
     terms,
 )
-from hapticd.simulation.specialise import specialise
 
 
 class SimulatedDevice:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from hapticd.contracts.driver import DriverOptions
+from hapticd.driver import DriverOptions
 from hapticd.simulation.presets import PRESETS
 
 MAX_DELAY_SAMPLES = 128
@@ -222,12 +222,6 @@ class SimulationOptions(DriverOptions):
     )
     hand: Hand = Field(default_factory=Hand, description="who holds the device")
     changes: tuple[Change, ...] = Field((), description="new values from some time on")
-
-    def check_at(self, period_s: float) -> None:
-        """Refuse what a step of this length cannot hold."""
-        from hapticd.simulation.plant import epochs  # is built on these options
-
-        epochs(self, period_s)
 
     @model_validator(mode="before")
     @classmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from hapticd.contracts.metric import Metric
+from hapticd.device import Metric
 
 QUIET_S = 10.0
 """Shortest time between two warnings of the same metric [s]."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import replace
+from pathlib import Path
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.contracts.errors import HapticdError
-from hapticd.contracts.record import Flag, TickRecord
-from hapticd.control.predecessor import NOBODY, Predecessor, identity
-from hapticd.control.shared import RECORDS
-from hapticd.supervisor.arrivals import Arrivals
-from hapticd.supervisor.controlled import Control
-from hapticd.supervisor.start import Start
+from hapticd.errors import HapticdError
+from hapticd.loop.memory import RECORDS
+from hapticd.loop.resume import FROM_START, ResumeState, identity
+from hapticd.supervisor.child import LoopProcess, LoopStart
+from hapticd.tick.record import Flag, TickRecord
 
 FIRST_S = 1.0
 LONGEST_S = 30.0
@@ -41,13 +41,13 @@ class Recovery:
         self.lost_s = 0.0
         self.next_try_s = 0.0
         self.why = ""
-        self.before = NOBODY
+        self.before = FROM_START
         self._wait_s = FIRST_S
         self._found_s = 0.0
-        self._start: Start | None = None
-        self._arrivals = Arrivals()
+        self._start: LoopStart | None = None
+        self._arrivals = HotplugWatch()
 
-    def begin(self, control: Control, last: TickRecord, latched: bool, tared: bool, why: str) -> None:
+    def begin(self, control: LoopProcess, last: TickRecord, latched: bool, tared: bool, why: str) -> None:
         """Look for a device that has just been lost.
 
         Args:
@@ -62,9 +62,9 @@ class Recovery:
             self._wait_s = FIRST_S
         self.lost = True
         self.lost_s = now_s
-        self._arrivals = Arrivals()
+        self._arrivals = HotplugWatch()
         if control.shared.words[RECORDS]:
-            self.before = Predecessor(
+            self.before = ResumeState(
                 seq=last.seq + 1,
                 skipped=control.skipped,
                 law=last.law,
@@ -76,7 +76,7 @@ class Recovery:
             self.before = replace(self.before, latched=latched)
         self._put_off(why)
 
-    def turn(self, lost: Control, config: LoadedConfig) -> Control | None:
+    def turn(self, lost: LoopProcess, config: LoadedConfig) -> LoopProcess | None:
         """Go on looking; returns at once. The control process that has the device, once there is one.
 
         Args:
@@ -94,7 +94,7 @@ class Recovery:
         try:
             if self._start is None:
                 if now_s >= self.next_try_s:
-                    self._start = Start(config, self.before)
+                    self._start = LoopStart(config, self.before)
                 return None
             control = self._start.poll()
             if control is None:
@@ -108,7 +108,7 @@ class Recovery:
         self._found_s = now_s
         return control
 
-    def amend(self, before: Predecessor) -> None:
+    def amend(self, before: ResumeState) -> None:
         """Change what the next control process goes on from, also when it is already on its way.
 
         What changes nothing costs no try: who says `clear` again and again would keep the device away.
@@ -127,3 +127,35 @@ class Recovery:
         self.why = why
         self.next_try_s = time.monotonic() + self._wait_s
         self._wait_s = min(2.0 * self._wait_s, LONGEST_S)
+
+
+PLACES = (Path("/sys/bus/usb/devices"), Path("/sys/class/hidraw"), Path("/sys/class/tty"))
+"""Directories with an entry a device."""
+
+EVERY_S = 0.25
+"""How often the lists are looked at [s]; a look takes some 50 us."""
+
+
+class HotplugWatch:
+    """What was plugged in since the last look."""
+
+    def __init__(self) -> None:
+        self._seen = _listed()
+        self._due_s = 0.0
+
+    def news(self) -> bool:
+        """Whether a device has come since this was asked last."""
+        now_s = time.monotonic()
+        if now_s < self._due_s:
+            return False
+        self._due_s = now_s + EVERY_S
+        before, self._seen = self._seen, _listed()
+        return not self._seen <= before
+
+
+def _listed() -> set[Path]:
+    seen: set[Path] = set()
+    for place in PLACES:
+        with contextlib.suppress(OSError):  # a computer without such devices has no list of them
+            seen.update(place.iterdir())
+    return seen

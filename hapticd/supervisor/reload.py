@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 from hapticd.config.file import read
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.problems import key_path, shown_value
-from hapticd.contracts.errors import ConfigError, HapticdError
-from hapticd.contracts.event import EventCode
-from hapticd.keys.access import key_ring
-from hapticd.supervisor.requests import Answer
-from hapticd.supervisor.watcher import FileWatcher
+from hapticd.errors import ConfigError, HapticdError
+from hapticd.keys.policy import key_ring
+from hapticd.supervisor.file_watch import FileWatcher
+from hapticd.supervisor.request_queue import Answer
+from hapticd.tick.event import EventCode
 
 if TYPE_CHECKING:
-    from hapticd.supervisor.service import Service
+    from hapticd.supervisor.daemon import Daemon
 
 LIVE: Final = (
     "scene",
@@ -39,7 +39,7 @@ class Reload:
         service: the daemon that it is for.
     """
 
-    def __init__(self, service: Service) -> None:
+    def __init__(self, service: Daemon) -> None:
         self._service = service
         self._waiting: list[Answer] = []
         self._under_way = False
@@ -106,7 +106,7 @@ class Reload:
             other_law = not same_law(service.config, wanted)
             service.recovery.amend(replace(before, law=before.law + other_law))
             text = f"configuration {wanted.hash}: in force when the device is back"
-            service.chronicle.tell_now(EventCode.SWITCHED, text, service.config, service.control)
+            service.event_log.tell_now(EventCode.SWITCHED, text, service.config, service.control)
             finish("")
         else:
             service.requests.submit(switch_letter(service.config, wanted), finish)
@@ -114,7 +114,7 @@ class Reload:
     def _refuse(self, why: str, answers: list[Answer]) -> None:
         service = self._service
         text = f"configuration refused, nothing changed: {why}"
-        service.chronicle.tell_now(EventCode.REFUSED, text, service.config, service.control)
+        service.event_log.tell_now(EventCode.REFUSED, text, service.config, service.control)
         service.notifier.send("READY=1")
         for answer in answers:
             answer(why)

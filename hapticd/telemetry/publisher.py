@@ -16,14 +16,14 @@ from typing import Any
 import zmq
 
 from hapticd.config.models import TelemetryConfig
-from hapticd.contracts.errors import InstanceError
-from hapticd.contracts.event import Event
-from hapticd.contracts.record import TickRecord
-from hapticd.keys.access import stays_here
-from hapticd.keys.directory import KeyRing
-from hapticd.keys.gate import Gate
+from hapticd.errors import InstanceError
+from hapticd.keys.policy import stays_here
+from hapticd.keys.server import CurveServer
+from hapticd.keys.store import KeyRing
 from hapticd.telemetry import wire
 from hapticd.telemetry.wire import INVALID, Inputs, Map, Topic, timestamp_s
+from hapticd.tick.event import LoopEvent
+from hapticd.tick.record import TickRecord
 
 BATCH_NS = 20_000_000
 """Longest time that a tick waits in a batch [ns]."""
@@ -103,7 +103,7 @@ class Publisher:
         self.reconfigure(config)
 
         self._ipc_path: Path | None = None
-        self._gate: Gate | None = None
+        self._gate: CurveServer | None = None
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.XPUB)
         try:
@@ -152,7 +152,7 @@ class Publisher:
             self._send(Topic.CYCLE, cycles)
         self.service()
 
-    def event(self, event: Event) -> None:
+    def event(self, event: LoopEvent) -> None:
         """Publish an event at once."""
         self.counts.events += 1
         self._send(Topic.EVENT, [wire.event_map(event, timestamp_s(event.deadline_ns, self._offset_ns))])
@@ -274,7 +274,7 @@ class Publisher:
                 "telemetry.tcp to a loopback address such as tcp://127.0.0.1:9872"
             )
         try:
-            self._gate = Gate(self._socket, endpoint, ring.pair, ring.watchers())
+            self._gate = CurveServer(self._socket, endpoint, ring.pair, ring.watchers())
         except zmq.ZMQError as error:
             raise _refused(endpoint, error) from error
         self.endpoints.append(self._gate.endpoint)

@@ -15,8 +15,8 @@ from typing import Any, Protocol
 
 import msgpack
 
-from hapticd.contracts.event import Event
-from hapticd.contracts.record import TickRecord, WallRecord
+from hapticd.tick.event import LoopEvent
+from hapticd.tick.record import TickRecord, WallRecord
 
 SCHEMA = 1
 """Version of the contract; goes up only when a key changes its meaning or goes, which clients must notice."""
@@ -190,7 +190,7 @@ def cycle_map(record: TickRecord, timestamp: float, wall: int) -> Map:
     )
 
 
-def event_map(event: Event, timestamp: float) -> Map:
+def event_map(event: LoopEvent, timestamp: float) -> Map:
     """hapticd/event: what happened; its fields stand beside the four keys that every event has."""
     return plain_map({**event.fields, "timestamp": timestamp, "seq": event.seq, "code": event.code, "text": event.text})
 

@@ -16,9 +16,9 @@ import typer
 
 from hapticd import __version__
 from hapticd.cli import main
-from hapticd.cli.overview import COMMANDS, application
-from hapticd.contracts.errors import DeviceNotFoundError
-from hapticd.share import directory
+from hapticd.cli.app import COMMANDS, application
+from hapticd.errors import DeviceNotFoundError
+from hapticd.paths import directory
 
 HAPTICD = Path(sys.executable).with_name("hapticd")
 GOOD = str(directory("config") / "hapticd.toml")
@@ -44,7 +44,8 @@ def test_version_and_help_are_answers() -> None:
     assert hapticd("--version").stdout == f"hapticd {__version__}\n"
     done = hapticd("--help")
     assert done.returncode == 0
-    assert all(summary in done.stdout for summary in COMMANDS.values())
+    assert all(summary in done.stdout for _, summary in COMMANDS.values())
+    assert "Put laws to the test" in done.stdout, "commands of the entry-point group are listed"
 
 
 def test_no_command_is_a_misuse_that_shows_the_overview() -> None:
@@ -88,7 +89,7 @@ def commands_of(app: typer.Typer, *path: str) -> list[tuple[str, ...]]:
     return [(*path, name) for name in names] + inner
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", [*COMMANDS, "study", "bench"])
 def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     paths = [path for path in commands_of(application(name)) if path[0] == name]
     assert paths
@@ -98,8 +99,19 @@ def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest
         shown = capsys.readouterr().out
         assert ended.value.code == 0
         assert f"Example: hapticd {' '.join(path)}" in shown
-        if len(path) == 1:
-            assert COMMANDS[name] in shown, "the overview and the command say different things"
+        if len(path) == 1 and name in COMMANDS:
+            assert COMMANDS[name][1] in shown, "the overview and the command say different things"
+
+
+@pytest.mark.parametrize("group", ["study", "bench"])
+def test_a_group_and_its_commands_say_the_same(group: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (found,) = [each.typer_instance for each in application(group).registered_groups if each.name == group]
+    assert found is not None
+    assert len(found.registered_commands) >= 6
+    for command in found.registered_commands:
+        with pytest.raises(SystemExit):
+            main([group, command.name or "", "--help"])
+        assert (command.help or "").rstrip(".") in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from hapticd.cli import main
-from hapticd.keys.directory import KeyDirectory
 from hapticd.keys.file import read
+from hapticd.keys.store import KeyDirectory
 
 
 @pytest.fixture

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from hapticd.config.loading import load, parse
-from hapticd.share import directory
-from hapticd.study import traces
-from hapticd.study.offline import OfflineRun, Row
-from hapticd.study.traces import open_trace
+from hapticd.offline import traces
+from hapticd.offline.run import OfflineRun, Row
+from hapticd.offline.traces import open_trace
+from hapticd.paths import directory
 from tests.daemon.running import Daemon, all_records, wait_until
 
 HAPTICD = Path(sys.executable).with_name("hapticd")

@@ -25,13 +25,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.bench.telemetry import synthetic_records
 from hapticd.cli import main
-from hapticd.cli.picture import Known, frame, late_ticks, one_line, si
-from hapticd.cli.trace import SLICE_S, Trace, axis, bars, plot
+from hapticd.cli.watch.plot import SLICE_S, Trace, axis, bars, plot
+from hapticd.cli.watch.screen import ScreenState, frame, late_ticks, one_line, si
 from hapticd.client import Cycle, Damping, Energy, Event, Position, Status
-from hapticd.contracts import event as contract
-from hapticd.telemetry.status import LateHistogram
+from hapticd.telemetry.records import LateHistogram
+from hapticd.tick import event as contract
+from hapticd_bench.telemetry import synthetic_records
 from tests.examples import examples
 from tests.telemetry.sockets import PATIENCE_S, Wire
 
@@ -167,8 +167,8 @@ def has_trace(terminal: Terminal) -> bool:
 def test_one_screen_says_all_that_matters(feed: Feed) -> None:
     with Terminal(feed, "--connect", feed.wire.endpoint) as terminal:
         terminal.shows("hapticd default")
-        feed.wire.publisher.event(contract.Event(103, "law none -> energy-cycle", 1, 0))
-        feed.wire.publisher.event(contract.Event(204, "device lost", 1, 0))
+        feed.wire.publisher.event(contract.LoopEvent(103, "law none -> energy-cycle", 1, 0))
+        feed.wire.publisher.event(contract.LoopEvent(204, "device lost", 1, 0))
         terminal.shows("✗ device lost", "· law none -> energy-cycle")
         terminal.wait_for(lambda: has_trace(terminal), "traces")
         terminal.shows("111 ms", "kg")
@@ -304,7 +304,7 @@ def test_once_without_a_daemon_fails_with_one_line(
     feed: Feed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     feed.wire.publisher.close()
-    monkeypatch.setattr("hapticd.cli.watch._PATIENCE_S", 0.1)
+    monkeypatch.setattr("hapticd.cli.watch.command._PATIENCE_S", 0.1)
     with pytest.raises(SystemExit) as ended:
         main(["watch", "--once", "--connect", feed.wire.endpoint])
     assert ended.value.code == 1
@@ -345,7 +345,7 @@ def test_whatever_is_known_the_picture_has_the_size_of_the_terminal(
     warnings: list[str],
     metrics: dict[str, float],
 ) -> None:
-    known = Known()
+    known = ScreenState()
     armed, fallback, latched, told = flags
     if told:
         texts = tuple(" ".join(one.split()) for one in warnings)
@@ -363,7 +363,7 @@ def test_whatever_is_known_the_picture_has_the_size_of_the_terminal(
 
 
 def test_a_latched_fault_says_how_to_go_on() -> None:
-    known = Known()
+    known = ScreenState()
     known.take([Status(latched=True, law="tdpa")], 0.0)
     text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
     assert "LATCHED" in text
@@ -372,7 +372,7 @@ def test_a_latched_fault_says_how_to_go_on() -> None:
 
 @pytest.mark.parametrize("armed", [True, False])
 def test_a_force_is_shown_as_limited_only_where_forces_are_let_through(armed: bool) -> None:
-    known = Known()
+    known = ScreenState()
     applied_n = (12.0,) if armed else (0.0,)
     known.take([Status(armed=armed, axes=("z",)), Position(0.0, 1, (-0.1,), (0.0,), applied_n, (300.0,))], 0.0)
     text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
@@ -380,7 +380,7 @@ def test_a_force_is_shown_as_limited_only_where_forces_are_let_through(armed: bo
 
 
 def test_a_device_that_is_not_calibrated_says_what_it_waits_for() -> None:
-    known = Known()
+    known = ScreenState()
     known.take([Status(calibrated=False, law="tdpa")], 0.0)
     text = "\n".join(line.plain for line in frame(known, "ipc:///x", 100, 24, 0.0))
     assert "hapticd calibrate" in text
@@ -395,7 +395,7 @@ def test_late_ticks_are_those_of_160_us_and_more() -> None:
 
 
 def test_one_line_names_each_axis() -> None:
-    known = Known()
+    known = ScreenState()
     known.take([Status(axes=("x", "y"), law="none"), Position(0.0, 1, (1e-3, -2e-3), (), (1.0, 0.0), ())], 0.0)
     assert "disarmed  none" in one_line(known)
     assert "x +1.000 mm +1.00 N  y -2.000 mm +0.00 N" in one_line(known)

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.editing import with_law
-from hapticd.contracts.errors import ConfigError
-from hapticd.share import directory
+from hapticd.errors import ConfigError
+from hapticd.paths import directory
 from tests.examples import examples
 
 REFERENCE = (directory("config") / "hapticd.toml").read_text()

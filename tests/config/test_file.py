@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from hapticd.config.file import read, replace
-from hapticd.contracts.errors import ConfigError
+from hapticd.errors import ConfigError
 
 NOBODY = 65534
 
@@ -71,7 +71,7 @@ def test_who_may_not_replace_it_is_told_so_and_it_stays_as_it_was() -> None:
     """As a user who may write neither the file nor its directory, whoever runs this test."""
     script = (
         "import os, sys\nfrom pathlib import Path\n"
-        "from hapticd.config.file import replace\nfrom hapticd.contracts.errors import ConfigError\n"
+        "from hapticd.config.file import replace\nfrom hapticd.errors import ConfigError\n"
         f"if os.geteuid() == 0:\n    os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY})\n"
         "try:\n    replace(Path(sys.argv[1]), 'new')\nexcept ConfigError as error:\n    print(error)\n"
     )

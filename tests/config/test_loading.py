@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from hapticd.config.effective import effective_toml
 from hapticd.config.loading import load, parse
 from hapticd.config.models import Config
-from hapticd.contracts.errors import ConfigError
-from hapticd.contracts.table import Table
-from hapticd.share import default_config, directory
+from hapticd.errors import ConfigError
+from hapticd.paths import default_config, directory
+from hapticd.settings import Table
 
 REFERENCE = (directory("config") / "hapticd.toml").read_text()
 
@@ -78,7 +78,7 @@ def test_a_plugin_that_declares_a_table_inside_an_array_gets_tuples() -> None:
 
 def test_without_a_configuration_the_machines_own_is_used(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     own = tmp_path / "hapticd.toml"
-    monkeypatch.setattr("hapticd.share.SYSTEM_CONFIG", own)
+    monkeypatch.setattr("hapticd.paths.SYSTEM_CONFIG", own)
     assert default_config() == directory("config") / "hapticd.toml"
     own.touch()
     assert default_config() == own

@@ -8,8 +8,8 @@ import pytest
 from pydantic import field_validator
 
 from hapticd.config.loading import load, parse
-from hapticd.contracts.errors import ConfigError
-from hapticd.contracts.law import LawParams
+from hapticd.errors import ConfigError
+from hapticd.law import LawParams
 
 
 def problems(text: str) -> tuple[str, ...]:

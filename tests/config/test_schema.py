@@ -9,9 +9,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from hapticd import registry
+from hapticd import plugins
 from hapticd.config.schema import json_schema
-from hapticd.share import directory
+from hapticd.paths import directory
 
 
 @pytest.fixture(scope="module")
@@ -43,9 +43,9 @@ def test_shipped_configurations_satisfy_it(schema: dict[str, Any], file: Path) -
 
 def test_it_covers_every_installed_plugin_with_descriptions_and_units(schema: dict[str, Any]) -> None:
     definitions = schema["$defs"]
-    for name in registry.names(registry.DRIVERS):
+    for name in plugins.names(plugins.DRIVERS):
         assert f"driver.{name}" in definitions
-    for name in registry.names(registry.CONTROLLERS):
+    for name in plugins.names(plugins.CONTROLLERS):
         assert f"law.{name}" in definitions
     rate = definitions["LoopConfig"]["properties"]["rate_hz"]
     assert (rate["description"], rate["minimum"]) == ("ticks a second [Hz]", 100.0)

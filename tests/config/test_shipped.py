@@ -12,8 +12,8 @@ from pydantic import BaseModel
 from hapticd.config.loading import load
 from hapticd.config.models import Config
 from hapticd.config.problems import tables_of
-from hapticd.control.process import make_tick, place_device
-from hapticd.share import directory
+from hapticd.paths import directory
+from hapticd.tick.assemble import make_tick, place_device
 
 SHIPPED = sorted(directory("config").glob("*.toml"))
 REAL_DEVICES = {"hid-rig", "omega7", "serial-rig"}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from hapticd.contracts.law import LawParams, LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
+from hapticd.law import LawParams, LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
 
 
 @dataclass(frozen=True)

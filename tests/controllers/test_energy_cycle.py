@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from hapticd.contracts.law import LawSnapshot
+from hapticd.law import LawSnapshot
 from hapticd_controllers import energy_cycle
 from hapticd_controllers.energy_cycle import Params
 

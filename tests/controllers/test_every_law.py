@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.contracts.law import (
+from hapticd.law import (
     LawParams,
     LawSnapshot,
     LawTick,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hapticd.contracts.law import LawSnapshot
+from hapticd.law import LawSnapshot
 from hapticd_controllers import energy_cycle, none, tdpa
 from hapticd_controllers.tdpa import Params
 

@@ -18,8 +18,8 @@ from typing import Any
 import msgpack
 import zmq
 
-from hapticd.contracts.record import RecordLayout, TickRecord
-from hapticd.control.shared import RECORDS, RecordReader, SharedMemory
+from hapticd.loop.memory import RECORDS, RecordReader, SharedMemory
+from hapticd.tick.record import RecordLayout, TickRecord
 
 HAPTICD = str(Path(sys.executable).parent / "hapticd")
 PATIENCE_S = 60.0
@@ -92,7 +92,7 @@ class Daemon:
         for entry in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
                 command = (entry / "cmdline").read_bytes().split(b"\0")
-                if b"hapticd.control.process" in command and str(self.process.pid).encode() in command:
+                if b"hapticd.loop.process" in command and str(self.process.pid).encode() in command:
                     return int(entry.name)
         return 0
 

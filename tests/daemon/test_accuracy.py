@@ -8,16 +8,16 @@ import signal
 
 import pytest
 
-from hapticd.cli.picture import Known, frame
+from hapticd.cli.watch.screen import ScreenState, frame
 from hapticd.config.loading import load, parse
-from hapticd.contracts.record import TickRecord
-from hapticd.control.fitting import track
-from hapticd.control.shared import RECORDS
-from hapticd.share import directory
+from hapticd.loop.memory import RECORDS
+from hapticd.offline.model_choice import track
+from hapticd.offline.run import play
+from hapticd.paths import directory
 from hapticd.simulation.options import SimulationOptions
-from hapticd.study.played import play
-from hapticd.study.scene.study import study
-from hapticd.telemetry.status import Status
+from hapticd.telemetry.records import Status
+from hapticd.tick.record import TickRecord
+from hapticd_studies.scene.study import study
 from tests.daemon.running import Daemon, Subscriber, all_records, wait_until
 
 TICKS = 2500
@@ -69,7 +69,7 @@ def test_the_daemon_errs_by_no_more_than_was_allowed(position_m: float, least_er
     assert max(errors_j) > 0.0
     assert told.startswith("exact step without ")
     assert " instead of " in told
-    known = Known()
+    known = ScreenState()
     known.take([Status(accuracy=told, armed=True)], 0.0)
     assert told in " ".join(" ".join(line.plain.split()) for line in frame(known, "ipc://lab", 80, 40, 0.0))
 

@@ -13,8 +13,8 @@ import msgpack
 import pytest
 import zmq
 
-from hapticd.contracts.event import EventCode
-from hapticd.control.shared import RECORDS
+from hapticd.loop.memory import RECORDS
+from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, all_records, wait_until
 from tests.daemon.test_deaths import PRESSED, pressing
 
@@ -24,7 +24,7 @@ PATIENCE_MS = int(PATIENCE_S * 1e3)
 GOOD_LAW = '''
 """A law of a lab's own: the wall with constant damping."""
 from pydantic import Field
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 class Params(LawParams):
     """One."""
     damping_n_s_per_m: float = Field(8.0, ge=0)

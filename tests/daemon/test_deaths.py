@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from hapticd.contracts.event import EventCode
-from hapticd.contracts.record import TickRecord
-from hapticd.control.shared import RECORDS
+from hapticd.loop.memory import RECORDS
+from hapticd.tick.event import EventCode
+from hapticd.tick.record import TickRecord
 from tests.daemon.running import Daemon, Subscriber, all_records, gone, wait_until
 
 PRESSED = """
@@ -25,7 +25,7 @@ stiffness_n_per_m = 12000.0
 
 ENDLESS_LAW = '''
 """A law that never returns once it has been asked 300 times in contact."""
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 class Params(LawParams):
     """None."""
 class State:

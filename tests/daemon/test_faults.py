@@ -18,8 +18,8 @@ from typing import Any
 import pytest
 import zmq
 
-from hapticd.contracts.event import EventCode
 from hapticd.faults.store import FaultStore
+from hapticd.tick.event import EventCode
 from tests.daemon.running import Subscriber, all_records, gone, wait_until
 from tests.daemon.test_deaths import nothing_left
 from tests.faults.rig import Felt, Report, Rig, events_until
@@ -254,7 +254,10 @@ def helper_of(rig: Rig) -> int:
     for entry in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            if parent == rig.daemon.process.pid and b"hapticd.supervisor.release" in (entry / "cmdline").read_bytes():
+            if (
+                parent == rig.daemon.process.pid
+                and b"hapticd.supervisor.force_release" in (entry / "cmdline").read_bytes()
+            ):
                 return int(entry.name)
     raise AssertionError("there is no helper")
 

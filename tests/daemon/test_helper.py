@@ -10,9 +10,9 @@ from tests.daemon.test_deaths import PRESSED, pressing
 WITNESS = """
 import sys, time
 from pathlib import Path
-if "hapticd.supervisor.release" in sys.orig_argv:
+if "hapticd.supervisor.force_release" in sys.orig_argv:
     HELPER
-elif "hapticd.control.process" in sys.orig_argv:
+elif "hapticd.loop.process" in sys.orig_argv:
     Path(__file__).with_name("control").write_text(str(time.monotonic_ns()))
 """
 

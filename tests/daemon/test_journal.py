@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.supervisor.journal import JournalHandler, datagram, log_handler
+from hapticd.supervisor.systemd import JournalHandler, datagram, log_handler
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hapticd.contracts.event import EventCode
+from hapticd.tick.event import EventCode
 from tests.daemon.running import Daemon, Subscriber
 from tests.faults.rig import Rig, events_until
 

@@ -11,12 +11,12 @@ import pytest
 from hapticd.config.loading import parse
 from hapticd.config.models import Config
 from hapticd.config.problems import tables_of
-from hapticd.contracts.table import Table
-from hapticd.guard import Guard
+from hapticd.settings import Table
 from hapticd.supervisor.reload import needs_restart, switch_letter
-from tests.control.bench import Bench
+from hapticd.tick.guard import Guard
 from tests.daemon.running import Daemon, Subscriber
 from tests.daemon.test_switching import Asker
+from tests.loop.bench import Bench
 
 HAND = "hand = { force = { profile = 'constant', newton = -3.0 }, stiffness_n_per_m = 2000.0 }\n"
 DEVICE = f"[device.options]\n{HAND}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 
-from hapticd.contracts.event import Event, EventCode
+from hapticd.tick.event import EventCode, LoopEvent
 from tests.daemon.running import Daemon, Subscriber
 from tests.daemon.test_deaths import PRESSED
 
@@ -15,7 +15,7 @@ def test_events_that_were_overwritten_are_told_like_ticks_that_were() -> None:
         memory = daemon.memory()
         daemon.process.send_signal(signal.SIGSTOP)
         for number in range(400):
-            memory.write_event(Event(EventCode.OVERRUN_BURST, f"burst {number}", 0, 0))
+            memory.write_event(LoopEvent(EventCode.OVERRUN_BURST, f"burst {number}", 0, 0))
         daemon.process.send_signal(signal.SIGCONT)
         told = subscriber.until("hapticd/event", code=EventCode.RING_DROPPED)
         lost = int(str(told["text"]).removesuffix(" events were overwritten before they were published"))

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hapticd.control.predecessor import Predecessor
+from hapticd.loop.resume import ResumeState
 from hapticd.supervisor import recovery
 from hapticd.supervisor.recovery import Recovery
 
@@ -16,7 +16,7 @@ from hapticd.supervisor.recovery import Recovery
 class UnderWay:
     """A start that takes its time."""
 
-    def __init__(self, _config: Any, before: Predecessor) -> None:
+    def __init__(self, _config: Any, before: ResumeState) -> None:
         self.before = before
         self.ended = False
 
@@ -35,7 +35,7 @@ def looking(monkeypatch: pytest.MonkeyPatch) -> tuple[Recovery, list[UnderWay]]:
         tries.append(UnderWay(*arguments))
         return tries[-1]
 
-    monkeypatch.setattr(recovery, "Start", start)
+    monkeypatch.setattr(recovery, "LoopStart", start)
     made = Recovery()
     made.begin(LOST, NO_TICK, True, False, "unplugged")
     try_now(made)

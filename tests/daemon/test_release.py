@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 from hapticd.config.loading import parse
-from hapticd.supervisor.controlled import kill
-from hapticd.supervisor.release import TIMEOUT_S, Release
+from hapticd.supervisor.child import kill
+from hapticd.supervisor.force_release import TIMEOUT_S, ForceRelease
 
 CONFIG = '[loop]\nrealtime = "off"\n[device]\ndriver = "loopback"\n'
 
 
 @pytest.fixture
-def release() -> Iterator[Release]:
-    helper = Release(parse(CONFIG, "lab.toml"))
+def release() -> Iterator[ForceRelease]:
+    helper = ForceRelease(parse(CONFIG, "lab.toml"))
     yield helper
     helper.close()
 
@@ -29,19 +29,19 @@ def test_a_helper_that_is_slow_to_start_is_waited_for(tmp_path: Path, monkeypatc
     """On a busy computer the imports take longer than a device may; the device's time begins after them."""
     (tmp_path / "sitecustomize.py").write_text(f"import time\ntime.sleep({TIMEOUT_S + 1.0})\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    helper = Release(parse(CONFIG, "lab.toml"))
+    helper = ForceRelease(parse(CONFIG, "lab.toml"))
     assert helper.release() == "the device is without force"
     helper.close()
 
 
-def test_a_helper_that_somebody_killed_is_replaced(release: Release) -> None:
+def test_a_helper_that_somebody_killed_is_replaced(release: ForceRelease) -> None:
     assert release.wait_ready()
     os.kill(release._helper.pid, signal.SIGKILL)
     release._helper.wait()
     assert release.release() == "the device is without force"
 
 
-def test_a_helper_that_cannot_start_is_told(release: Release, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_helper_that_cannot_start_is_told(release: ForceRelease, monkeypatch: pytest.MonkeyPatch) -> None:
     release.close()
     monkeypatch.setattr("sys.executable", "/bin/false")
     assert "did not start" in release.release()
@@ -56,7 +56,7 @@ class _Unkillable(subprocess.Popen[bytes]):
 
 
 def test_a_control_process_that_cannot_be_killed_does_not_keep_the_force_from_being_taken_away(
-    release: Release,
+    release: ForceRelease,
 ) -> None:
     with _Unkillable(["/bin/sleep", "1000"]) as stuck:
         kill(stuck)

@@ -17,9 +17,9 @@ from pathlib import Path
 import pytest
 
 from hapticd.client import Position, RefusedKeyError, connect
-from hapticd.contracts.event import EventCode
-from hapticd.keys.directory import KeyDirectory
 from hapticd.keys.file import new_pair, write
+from hapticd.keys.store import KeyDirectory
+from hapticd.tick.event import EventCode
 from tests.daemon.computers import Computers, two_computers
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.daemon.test_deaths import PRESSED

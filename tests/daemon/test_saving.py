@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.contracts.errors import ConfigError
-from hapticd.contracts.event import EventCode
-from hapticd.supervisor.watcher import LOOK_S, QUIET_S, FileWatcher, steps_to
+from hapticd.errors import ConfigError
+from hapticd.supervisor.file_watch import LOOK_S, QUIET_S, FileWatcher, steps_to
+from hapticd.tick.event import EventCode
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
 from tests.daemon.test_deaths import PRESSED, pressing
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hapticd.config.loading import parse
-from hapticd.supervisor.service import Service
+from hapticd.supervisor import daemon as supervising
 from tests.daemon.running import Daemon
 from tests.daemon.test_deaths import PRESSED, nothing_left, pressing
 
@@ -65,7 +65,7 @@ def test_a_loop_that_has_to_be_killed_at_the_end_leaves_no_force_behind(
 ) -> None:
     """Whatever the daemon ends for, such as an error of its own."""
     monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
-    service = Service(parse('[loop]\nrealtime = "off"\n', "lab.toml"), "default")
+    service = supervising.Daemon(parse('[loop]\nrealtime = "off"\n', "lab.toml"), "default")
     service.control.process.send_signal(signal.SIGSTOP)
     service._undo.close()
     assert service.control.exit_code == -signal.SIGKILL

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.contracts.event import EventCode
+from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, Daemon, Subscriber
 from tests.daemon.test_deaths import PRESSED, pressing
 from tests.daemon.test_switching import Asker

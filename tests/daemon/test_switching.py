@@ -20,7 +20,7 @@ import msgpack
 import pytest
 import zmq
 
-from hapticd.contracts.event import EventCode
+from hapticd.tick.event import EventCode
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
 from tests.daemon.test_deaths import PRESSED, Report, pressing
 

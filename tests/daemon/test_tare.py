@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hapticd.contracts.event import EventCode
+from hapticd.tick.event import EventCode
 from tests.daemon.running import Subscriber
 from tests.faults.rig import Rig, events_until
 

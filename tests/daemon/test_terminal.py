@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.commander import command
+from hapticd.client.commands import command
 from tests.daemon.running import HAPTICD, PATIENCE_S, wait_until
 from tests.daemon.terminal import Terminal
 

@@ -19,7 +19,7 @@ from hapticd.config.models import LoopConfig
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.examination import Examination, verdict
 from hapticd.doctor.finding import Finding, Mark
-from hapticd.share import directory
+from hapticd.paths import directory
 from tests.daemon.running import Daemon
 
 HAPTICD = str(Path(sys.executable).with_name("hapticd"))

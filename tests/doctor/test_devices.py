@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from hapticd import lookup, registry
+from hapticd import discovery, plugins
 from hapticd.config.models import LoopConfig
-from hapticd.contracts.device import FoundDevice
-from hapticd.contracts.driver import Driver, DriverOptions
+from hapticd.device import FoundDevice
+from hapticd.discovery import Discovery, look
 from hapticd.doctor import driver, endpoints, rules, usb
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.examination import Examination
 from hapticd.doctor.finding import examine
-from hapticd.lookup import Lookup, look
-from hapticd.share import directory
+from hapticd.driver import Driver, DriverOptions
+from hapticd.paths import directory
 from hapticd_drivers.rig.serial_rig import SerialRigOptions
 from tests.doctor.machine import Machine, says
 from tests.drivers.plugin import install
@@ -72,7 +72,7 @@ def test_of_a_device_that_is_not_on_usb_nothing_is_said(machine: Machine, place:
 # -- what the driver says itself
 
 
-def looked(driver: str, options: DriverOptions | None = None) -> Lookup:
+def looked(driver: str, options: DriverOptions | None = None) -> Discovery:
     (answer,) = look({driver: options})
     return answer
 
@@ -112,9 +112,11 @@ def test_a_device_that_cannot_be_used_is_a_problem_unless_there_is_another() -> 
     locked = FoundDevice("rig", "7", "/dev/hidraw0", "this user may not open it", mend=("sudo chmod",))
     busy = FoundDevice("rig", "8", problem="another program has it open")
     free = FoundDevice("rig", "9", note="not calibrated")
-    alone = says(driver.devices(Lookup("hid-rig", (locked,)), 0), "problem", "rig 7 (/dev/hidraw0): this user may not")
+    alone = says(
+        driver.devices(Discovery("hid-rig", (locked,)), 0), "problem", "rig 7 (/dev/hidraw0): this user may not"
+    )
     assert alone.mend == ("sudo chmod",)
-    first, second, third = driver.devices(Lookup("hid-rig", (locked, busy, free)), 0)
+    first, second, third = driver.devices(Discovery("hid-rig", (locked, busy, free)), 0)
     says(first, "advice", "rig 7")
     assert "devices hid-rig" in says(second, "advice", "rig 8: another program").mend[0]
     says(third, "ok", "rig 9: not calibrated")
@@ -122,19 +124,19 @@ def test_a_device_that_cannot_be_used_is_a_problem_unless_there_is_another() -> 
 
 def test_a_driver_that_cannot_look_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     """Looking is optional; that it found nothing would then be a claim about nothing."""
-    monkeypatch.setattr(registry, "driver", lambda _: Driver)
-    says(driver.devices(Lookup("odd"), 0), "unknown", "odd cannot look")
+    monkeypatch.setattr(plugins, "driver", lambda _: Driver)
+    says(driver.devices(Discovery("odd"), 0), "unknown", "odd cannot look")
 
 
 def test_beside_the_daemon_nothing_is_looked_for(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def note(drivers: dict[str, DriverOptions | None], *, find: bool) -> list[Lookup]:
+    def note(drivers: dict[str, DriverOptions | None], *, find: bool) -> list[Discovery]:
         asked.append(find)
-        return [Lookup(name) for name in drivers]
+        return [Discovery(name) for name in drivers]
 
     monkeypatch.setattr(endpoints, "running", lambda *_: 4711)
-    monkeypatch.setattr(lookup, "look", note)
+    monkeypatch.setattr(discovery, "look", note)
     wanted = Wanted(Path("lab.toml"), LoopConfig(), "hid-rig", {})
     checks = {check.name: check for check in Examination(wanted, "default", machine.root).checks()}
     says(examine(checks["driver.devices"]), "ok", "running daemon")

@@ -16,10 +16,10 @@ import pytest
 from hapticd.doctor import configuration, endpoints
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.finding import Check, examine
-from hapticd.keys.directory import KeyDirectory
 from hapticd.keys.file import new_pair
-from hapticd.share import directory
-from hapticd.supervisor.instance import InstanceLock
+from hapticd.keys.store import KeyDirectory
+from hapticd.paths import directory
+from hapticd.supervisor.lock import InstanceLock
 from tests.doctor.machine import says
 
 

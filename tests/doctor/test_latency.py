@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from hapticd.bench import Quantiles
 from hapticd.config.models import LoopConfig
-from hapticd.contracts.errors import HapticdError
 from hapticd.doctor.latency import Latency, judge, measure
+from hapticd.errors import HapticdError
+from hapticd.measure import Quantiles
 from tests.doctor.machine import says
 
 

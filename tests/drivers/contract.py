@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from hapticd.contracts.driver import Driver, DriverState
-from hapticd.contracts.errors import DriverStateError
-from hapticd.contracts.metric import MOST_METRICS
+from hapticd.device import MOST_METRICS
+from hapticd.driver import Driver, DriverState
+from hapticd.errors import DriverStateError
 
 AnyDriver = Driver[Any]
 

@@ -16,9 +16,9 @@ def install(directory: Path, monkeypatch: pytest.MonkeyPatch, *methods: str, nam
     (information / "entry_points.txt").write_text(f"[hapticd.drivers]\n{name} = {module}:Driver\n")
     lines = [
         "import ctypes, os, time",
-        "from hapticd.contracts.diagnosis import Diagnosis",
-        "from hapticd.contracts.device import FoundDevice",
-        "from hapticd.contracts.errors import DriverError",
+        "from hapticd.device import Diagnosis",
+        "from hapticd.device import FoundDevice",
+        "from hapticd.errors import DriverError",
         "from hapticd_drivers.loopback import Loopback",
         "class Driver(Loopback):",
         "    '''Somebody's own.'''",

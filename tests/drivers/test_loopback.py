@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hapticd.contracts.errors import DeviceFaultError, DeviceProtocolError
+from hapticd.errors import DeviceFaultError, DeviceProtocolError
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
 from hapticd_drivers.loopback import Loopback
@@ -39,8 +39,8 @@ class TestLoopback(DriverContract):
         assert isinstance(driver, Loopback)
         driver.read()  # the force acts over the period that a read ends
         driver.read()
-        assert driver._device is not None
-        return [driver._device.applied_n]
+        assert driver.model is not None
+        return [driver.model.applied_n]
 
 
 def wall(x_m: float) -> float:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticd import registry
-from hapticd.contracts.metric import Metric
+from hapticd import plugins
+from hapticd.device import Metric
 from hapticd.supervisor.metrics import QUIET_S, MetricWatch, values_of
 
 METRICS = (Metric("lost_frames", "frames that never came", warns=True), Metric("echo_us", "age of the echo"))
@@ -52,9 +52,9 @@ def test_a_number_that_makes_no_sense_is_no_growth(nonsense: float) -> None:
     assert told(MetricWatch(), nonsense, nonsense, 0.0) == []
 
 
-@pytest.mark.parametrize("name", registry.names(registry.DRIVERS))
+@pytest.mark.parametrize("name", plugins.names(plugins.DRIVERS))
 def test_the_page_names_every_metric_of_a_built_in_driver_and_which_of_them_warn(name: str) -> None:
     rows = re.findall(rf"^\| `{name}` \| `(\w+)` \| (.+) \|$", (DOCS / "drivers.md").read_text(), flags=re.MULTILINE)
     assert {key: meaning.endswith("; warns") for key, meaning in rows} == {
-        metric.name: metric.warns for metric in registry.driver(name).METRICS
+        metric.name: metric.warns for metric in plugins.driver(name).METRICS
     }

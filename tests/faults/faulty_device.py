@@ -14,9 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from hapticd.contracts.device import DeviceInfo
-from hapticd.contracts.errors import DeviceDisconnectedError, DeviceFaultError, DeviceNotFoundError
-from hapticd.contracts.sample import Sample
+from hapticd.device import DeviceInfo, Sample
+from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DeviceNotFoundError
 from hapticd.simulation.options import SimulationOptions
 from hapticd_drivers.loopback import Loopback
 

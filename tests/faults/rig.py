@@ -15,10 +15,9 @@ from typing import Any
 import msgpack
 import zmq
 
-from hapticd.contracts.event import EventCode
-from hapticd.faults.file import FaultRecord, read
+from hapticd.faults.record import FaultRecord, FaultSummary, read, summarise
 from hapticd.faults.store import FaultStore
-from hapticd.faults.summary import Summary, summarise
+from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.faults.faulty_device import WITNESS
 
@@ -27,7 +26,7 @@ DEVICE = Path(__file__).with_name("faulty_device.py")
 BAD_LAW = '''
 """A law that fails the way its name says."""
 import time
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 class Params(LawParams):
     """None."""
 class State:
@@ -191,7 +190,7 @@ class Rig:
         wait_until(lambda: self.felt().gone_after_ms is not None, "the force to go")
         return self.felt()
 
-    def recorded(self, code: EventCode) -> tuple[FaultRecord, Summary]:
+    def recorded(self, code: EventCode) -> tuple[FaultRecord, FaultSummary]:
         """The fault record of an event, once it is written."""
         store = FaultStore(self.daemon.directory / "state" / "default" / "faults")
         wait_until(lambda: any(path.stem.endswith(f"-{code}") for path in store.paths()), f"a fault record of {code}")

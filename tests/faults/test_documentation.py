@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from hapticd.config.models import FaultsConfig
-from hapticd.contracts.event import Event, EventCode
-from hapticd.control.loop import BURST_TICKS, LATE_S
-from hapticd.control.tick import FROZEN_TICKS
-from hapticd.supervisor.chronicle import FLOOD
-from hapticd.supervisor.controlled import STALL_S
+from hapticd.loop.loop import BURST_TICKS, LATE_S
+from hapticd.supervisor.child import STALL_S
+from hapticd.supervisor.events import FLOOD
 from hapticd.supervisor.recovery import FIRST_S, LONGEST_S, STEADY_S
+from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.tick import FROZEN_TICKS
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "faults.md").read_text()
@@ -35,7 +35,7 @@ def test_every_row_is_complete(code: str, name: str, rest: str) -> None:
     cells = rest.split(" | ")
     assert len(cells) == {"1": 1, "2": 5, "3": 3}[code[0]], name
     assert all(cell.strip() for cell in cells)
-    assert Event(int(code), "", 0, 0).is_fault == (code[0] == "2")
+    assert LoopEvent(int(code), "", 0, 0).is_fault == (code[0] == "2")
 
 
 @pytest.mark.parametrize("code", [code for code in EventCode if code >= 200 and code != EventCode.NOT_REALTIME])

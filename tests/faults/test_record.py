@@ -15,23 +15,21 @@ import pytest
 
 from hapticd.cli import main
 from hapticd.config.loading import parse
-from hapticd.contracts.device import DeviceInfo
-from hapticd.contracts.errors import ConfigError, HapticdError
-from hapticd.contracts.event import Event, EventCode
-from hapticd.contracts.record import RecordLayout
-from hapticd.control.shared import RECORDS, SharedMemory
+from hapticd.device import DeviceInfo
+from hapticd.errors import ConfigError, HapticdError
 from hapticd.faults.export import write_csv
-from hapticd.faults.file import MAGIC, encode, read, read_header
-from hapticd.faults.place import fault_directories, fault_directory
-from hapticd.faults.receipt import receipt
+from hapticd.faults.record import MAGIC, encode, read, read_header, receipt, summarise
 from hapticd.faults.store import FaultStore
-from hapticd.faults.summary import summarise
-from hapticd.supervisor.recorder import FaultRecorder
+from hapticd.loop.memory import RECORDS, SharedMemory
+from hapticd.paths import fault_directories, fault_directory
+from hapticd.supervisor.fault_recorder import FaultRecorder
+from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.record import RecordLayout
 from tests.daemon.running import wait_until
 
 RATE_HZ = 1000.0
 LAYOUT = RecordLayout(2, True, 8)
-EVENT = Event(EventCode.OVER_SPEED, "3 m/s is above the limit", 20, 20_000_000, {"speed": 3.0})
+EVENT = LoopEvent(EventCode.OVER_SPEED, "3 m/s is above the limit", 20, 20_000_000, {"speed": 3.0})
 
 
 def row(seq: int, force_n: float, walls: int = 1) -> bytes:
@@ -169,7 +167,7 @@ def test_a_record_holds_five_seconds_before_and_one_after_or_what_there_is(
     shared = SharedMemory(LAYOUT, RATE_HZ)
     extend(shared, before, first_seq)
     recorder = FaultRecorder(tmp_path)
-    recorder.begin(Event(EventCode.OVER_SPEED, "too fast", seq, 0), 1e9, shared, RATE_HZ, header())
+    recorder.begin(LoopEvent(EventCode.OVER_SPEED, "too fast", seq, 0), 1e9, shared, RATE_HZ, header())
     extend(shared, after, first_seq)
     shared.close()
     assert recorder.close(5, 10.0) == ""
@@ -182,7 +180,7 @@ def test_a_record_waits_for_the_ticks_after_the_fault(tmp_path: Path) -> None:
     shared = SharedMemory(LAYOUT, RATE_HZ)
     extend(shared, 100, 0)
     recorder = FaultRecorder(tmp_path)
-    recorder.begin(Event(EventCode.OVER_SPEED, "too fast", 50, 0), 1e9, shared, RATE_HZ, header())
+    recorder.begin(LoopEvent(EventCode.OVER_SPEED, "too fast", 50, 0), 1e9, shared, RATE_HZ, header())
     assert recorder.turn(5) == ""
     assert list(tmp_path.iterdir()) == []
     extend(shared, 950, 0)

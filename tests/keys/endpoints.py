@@ -11,13 +11,13 @@ from typing import Any
 
 import zmq
 
-from hapticd.bench.telemetry import synthetic_info
 from hapticd.config.models import TelemetryConfig
-from hapticd.keys.directory import KeyRing
 from hapticd.keys.file import Key
+from hapticd.keys.store import KeyRing
 from hapticd.supervisor.commands import CommandSocket
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.status import Status
+from hapticd.telemetry.records import Status
+from hapticd_bench.telemetry import synthetic_info
 from tests.telemetry.sockets import EPOCH_OFFSET_NS, PATIENCE_S
 
 TURN_S = 0.001

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.contracts.event import Event
 from hapticd.keys.file import Key, new_pair, write
+from hapticd.tick.event import LoopEvent
 from tests.keys.endpoints import Endpoints, ring_of
 from tests.telemetry.sockets import served, ticks
 
@@ -41,7 +41,7 @@ def assert_prints_ticks(command: Sequence[str | Path], place: Path, listed: Key)
         try:
             endpoints.turn_until(lambda: served(endpoints.publisher) >= 3, "three subscriptions")
             endpoints.publisher.publish(ticks(1020))
-            endpoints.publisher.event(Event(103, "none -> tdpa", 1019, 0))
+            endpoints.publisher.event(LoopEvent(103, "none -> tdpa", 1019, 0))
             lines: list[str] = []
             while not lines or not lines[-1].startswith("event"):
                 lines.append(subscriber.stdout.readline())

@@ -11,7 +11,7 @@ import zmq.auth
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from hapticd.contracts.errors import ConfigError
+from hapticd.errors import ConfigError
 from hapticd.keys.file import Key, KeyWriteError, is_key, new_pair, read, write
 from tests.examples import examples
 

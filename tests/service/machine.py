@@ -23,8 +23,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.contracts.record import RecordLayout
-from hapticd.control.shared import SharedMemory
+from hapticd.loop.memory import SharedMemory
+from hapticd.tick.record import RecordLayout
 from tests.daemon.running import PATIENCE_S, wait_until
 
 SOURCE = Path(__file__).parent.parent.parent
@@ -112,7 +112,7 @@ class Machine:
                     continue
                 if inside == main:
                     supervisor = int(entry.name)
-                elif "hapticd.control.process" in command and command[-2] == main:
+                elif "hapticd.loop.process" in command and command[-2] == main:
                     control = int(entry.name)
         assert supervisor
         assert control, self.journal()

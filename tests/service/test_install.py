@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.installation import Installation, InstallationError
+from hapticd.service.install import Installation, InstallationError
 from tests.service.machine import SOURCE
 
 CONFIG = "etc/hapticd/hapticd.toml"
@@ -145,7 +145,7 @@ def test_make_installs_into_a_tree_that_does_not_remember_where_it_was_built(tmp
     remembering = [path for path in texts if str(root).encode() in path.read_bytes()]
     assert remembering == []
     assert (root / "opt/hapticd/bin/hapticd").read_text().startswith("#!/opt/hapticd/bin/python")
-    shared = "import hapticd.share, sys; sys.stdout.write(str(hapticd.share.directory('systemd')))"
+    shared = "import hapticd.paths, sys; sys.stdout.write(str(hapticd.paths.directory('systemd')))"
     place = subprocess.run(
         [root / "opt/hapticd/bin/python", "-c", shared], cwd=tmp_path, capture_output=True, text=True, check=True
     )

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.contracts.event import EventCode
-from hapticd.contracts.record import TickRecord
-from hapticd.control.shared import RECORDS
+from hapticd.loop.memory import RECORDS
+from hapticd.tick.event import EventCode
+from hapticd.tick.record import TickRecord
 from tests.daemon.running import Subscriber, all_records, gone, wait_until
 from tests.daemon.test_deaths import PRESSED
 from tests.service.machine import Machine, booted, eventually, memory_of
@@ -27,7 +27,7 @@ CONFIG = "/etc/hapticd/hapticd.toml"
 SLOW_LAW = '''
 """A law that takes its time with the very first step."""
 import time
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 class Params(LawParams):
     """None."""
 class State:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.installation import UNITS
-from hapticd.share import directory
+from hapticd.paths import directory
+from hapticd.service.install import UNITS
 
 SYSTEMD = directory("systemd")
 MOST_EXPOSED = 2.0

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hapticd import registry
+from hapticd import plugins
 from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig, WallConfig
-from hapticd.contracts.errors import ConfigError, DeviceFaultError
-from hapticd.contracts.event import EventCode
-from hapticd.contracts.law import state_fields
-from hapticd.control.contact import RunningLaw
-from hapticd.control.tick import ControlTick
-from hapticd.guard import Guard
+from hapticd.errors import ConfigError, DeviceFaultError
+from hapticd.law import state_fields
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, BatchResult, Point
 from hapticd.simulation.options import SimulationOptions
+from hapticd.tick.contact import RunningLaw
+from hapticd.tick.event import EventCode
+from hapticd.tick.guard import Guard
+from hapticd.tick.tick import ControlTick
 from hapticd_drivers.loopback import Loopback
 
 T = 1e-3
@@ -95,7 +95,7 @@ def daemon(law: ModuleType, at: Point, ticks: int) -> tuple[np.ndarray[Any, Any]
     driver.enable()
     rows = np.full((ticks, len(TRACE_COLUMNS)), np.nan)
     contact = tick.contacts[0]
-    device = driver._device
+    device = driver.model
     assert device is not None
     for row in range(ticks):
         try:
@@ -124,7 +124,7 @@ def assert_same_rows(ours: np.ndarray[Any, Any], theirs: np.ndarray[Any, Any]) -
 
 
 def all_scenarios(name: str, ticks: int) -> tuple[Batch, BatchResult]:
-    law = registry.law(name)
+    law = plugins.law(name)
     batch = Batch(law, [point(law, scenario) for scenario in SCENARIOS], ticks * T, trace_every=1)
     return batch, batch.run()
 
@@ -182,13 +182,13 @@ READINGS: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("keys", READINGS, ids=lambda keys: "-".join(map(str, keys.values())))
 def test_every_reading_of_the_paper_is_the_same_interpreted_and_compiled(keys: dict[str, Any]) -> None:
-    law = registry.law("energy-cycle")
+    law = plugins.law("energy-cycle")
     batch = Batch(law, [point(law, scenario, **keys) for scenario in SCENARIOS], 3.0, trace_every=1)
     assert np.array_equal(batch.run().trace, batch.run_interpreted().trace, equal_nan=True)
 
 
 def test_threads_change_no_number() -> None:
-    law = registry.law("energy-cycle")
+    law = plugins.law("energy-cycle")
     points = [
         Point(SimulationOptions.model_validate({"hand": pressed(-3.0)}), wall(4000.0 + 50.0 * at), law.Params())
         for at in range(200)
@@ -208,7 +208,7 @@ def free(law: ModuleType, **device: Any) -> Point:
 
 
 def test_what_is_reported_is_what_the_trace_shows() -> None:
-    law = registry.law("energy-cycle")
+    law = plugins.law("energy-cycle")
     at = Point(
         SimulationOptions.model_validate({"hand": pressed(-3.0), "initial_position_m": 0.004}),
         wall(4000.0),
@@ -230,14 +230,14 @@ def test_what_is_reported_is_what_the_trace_shows() -> None:
 
 
 def test_the_trace_keeps_one_tick_in_so_many() -> None:
-    law = registry.law("none")
+    law = plugins.law("none")
     full = Batch(law, [free(law, hand=pressed(-1.0))], 0.5, trace_every=1).run().trace
     thin = Batch(law, [free(law, hand=pressed(-1.0))], 0.5, trace_every=7).run().trace
     assert np.array_equal(thin[0], full[0, 6::7])
 
 
 def test_a_loop_that_flies_apart_says_so_and_stops() -> None:
-    law = registry.law("none")
+    law = plugins.law("none")
     result = Batch(law, [free(law, viscous_n_s_per_m=-200.0, hand=pressed(-1.0)), free(law)], 2.0).run()
     assert result.finite.tolist() == [False, True]
     assert result.ticks[0] < 2000
@@ -246,7 +246,7 @@ def test_a_loop_that_flies_apart_says_so_and_stops() -> None:
 
 
 def test_memory_does_not_grow_with_the_simulated_time() -> None:
-    law = registry.law("none")
+    law = plugins.law("none")
 
     def size(seconds: float) -> int:
         return sum(array.nbytes for array in Batch(law, [free(law)], seconds).arrays())
@@ -255,6 +255,6 @@ def test_memory_does_not_grow_with_the_simulated_time() -> None:
 
 
 def test_a_point_that_cannot_be_simulated_is_named() -> None:
-    law = registry.law("none")
+    law = plugins.law("none")
     with pytest.raises(ConfigError, match=r"points\[1\].*stiffness"):
         Batch(law, [free(law), free(law, coulomb_n=1.0, hand=pressed(0.0, stiffness_n_per_m=1e9))], 1.0)

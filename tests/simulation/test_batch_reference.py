@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from hapticd.bench.batch import measure
+from hapticd_bench.batch import measure
 
 
 @pytest.mark.nightly

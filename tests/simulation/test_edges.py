@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from hapticd import registry
+from hapticd import plugins
 from hapticd.config.loading import parse
 from hapticd.config.models import WallConfig
-from hapticd.contracts.errors import ConfigError
+from hapticd.errors import ConfigError
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.batch.kernel import FARTHEST_M
 from hapticd.simulation.device import SimulatedDevice
@@ -135,7 +135,7 @@ def test_friction_below_what_a_force_resolves_is_refused() -> None:
 
 
 def test_a_batch_goes_on_where_it_was() -> None:
-    law = registry.law("none")
+    law = plugins.law("none")
     device = SimulationOptions.model_validate(
         {
             "force_delay_samples": 2,

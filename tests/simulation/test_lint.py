@@ -10,20 +10,20 @@ from types import ModuleType
 
 import pytest
 
-from hapticd import registry
+from hapticd import plugins
 from hapticd.config.models import WallConfig
-from hapticd.contracts.errors import PluginError
+from hapticd.errors import PluginError
 from hapticd.simulation.batch import Batch, Point
-from hapticd.simulation.compile import compiled_step
-from hapticd.simulation.lint import lint_law
+from hapticd.simulation.compiler.compile import compiled_step
+from hapticd.simulation.compiler.lint import lint_law
 from hapticd.simulation.options import SimulationOptions
 
 HEAD = """
 import math
 from math import hypot
-from hapticd import energy
-from hapticd.contracts.law import LawParams
-from hapticd.energy import CycleFields, cycle_ended
+from hapticd.tick import energy
+from hapticd.law import LawParams
+from hapticd.tick.energy import CycleFields, cycle_ended
 
 class Params(LawParams):
     gain: float = 1.0
@@ -63,7 +63,7 @@ def write_law(tmp_path: Path) -> Write:
 
 @pytest.mark.parametrize("name", ["none", "energy-cycle", "tdpa"])
 def test_the_shipped_laws_are_pure_arithmetic(name: str) -> None:
-    assert lint_law(registry.law(name)) == []
+    assert lint_law(plugins.law(name)) == []
 
 
 LAST_BITS = {

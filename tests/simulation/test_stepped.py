@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd import registry
+from hapticd import plugins
 from hapticd.config.models import WallConfig
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.device import SimulatedDevice
@@ -153,7 +153,7 @@ def test_friction_alone_never_turns_a_device_around(
 
 
 def test_compiled_and_interpreted_integrators_agree_to_the_last_bit_in_one_batch() -> None:
-    law = registry.law("none")
+    law = plugins.law("none")
     points = [
         Point(
             options(

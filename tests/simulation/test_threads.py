@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.simulation.threads import PIECES_PER_THREAD, cores, in_threads
+from hapticd.simulation.compiler.threads import PIECES_PER_THREAD, cores, in_threads
 
 SLOW_S = 0.5
 
@@ -32,7 +32,7 @@ def test_each_item_is_run_once(count: int, workers: int | None) -> None:
 
 
 def test_no_more_threads_than_were_asked_for_and_all_of_those(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hapticd.simulation.threads.cores", lambda: 3)
+    monkeypatch.setattr("hapticd.simulation.compiler.threads.cores", lambda: 3)
     for workers, threads in ((None, 3), (2, 2), (8, 3)):
         together = threading.Barrier(threads)
         seen: set[int] = set()
@@ -50,7 +50,7 @@ def test_there_are_as_many_cores_as_this_process_may_use() -> None:
 
 
 def test_what_a_piece_raises_is_raised_and_the_rest_is_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hapticd.simulation.threads.cores", lambda: 2)
+    monkeypatch.setattr("hapticd.simulation.compiler.threads.cores", lambda: 2)
     begun = []
 
     def code(first: int, _stop: int) -> None:
@@ -65,7 +65,7 @@ def test_what_a_piece_raises_is_raised_and_the_rest_is_not_begun(monkeypatch: py
 
 
 def test_an_interrupt_is_obeyed_after_the_pieces_that_are_being_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hapticd.simulation.threads.cores", lambda: 2)
+    monkeypatch.setattr("hapticd.simulation.compiler.threads.cores", lambda: 2)
     begun = []
 
     def code(first: int, _stop: int) -> None:

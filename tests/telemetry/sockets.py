@@ -13,12 +13,12 @@ from typing import Any
 import msgpack
 import zmq
 
-from hapticd.bench.telemetry import synthetic_info, synthetic_records
 from hapticd.config.models import TelemetryConfig
-from hapticd.contracts.record import TickRecord
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.status import Status
+from hapticd.telemetry.records import Status
 from hapticd.telemetry.wire import Inputs
+from hapticd.tick.record import TickRecord
+from hapticd_bench.telemetry import synthetic_info, synthetic_records
 
 PATIENCE_S = 20.0
 """How long anything may take on a busy machine before a test gives up."""

@@ -34,8 +34,8 @@ from hapticd.client import (
     connect,
     decode,
 )
-from hapticd.contracts import event as contract
 from hapticd.telemetry.wire import Topic, new_packer
+from hapticd.tick import event as contract
 from tests.examples import examples
 from tests.telemetry.sockets import PATIENCE_S, Wire, served, ticks, wait_until
 
@@ -68,7 +68,7 @@ def test_every_topic_arrives_as_its_record() -> None:
     with Wire() as wire, heard(wire) as client:
         (record, *_) = records = ticks(200)
         wire.publisher.publish(records)
-        wire.publisher.event(contract.Event(103, "none -> tdpa", 199, 0, {"law_index": 2}))
+        wire.publisher.event(contract.LoopEvent(103, "none -> tdpa", 199, 0, {"law_index": 2}))
         received = take(client, 4 * 200 + 2)
         first = {type(one): one for one in reversed(received)}
         position, energy, damping, timing = (first[kind] for kind in EVERY_TICK)
@@ -109,7 +109,7 @@ def test_a_status_comes_back_as_the_supervisor_filled_it_in() -> None:
 def test_topics_are_asked_for_by_class_or_by_name() -> None:
     with Wire() as wire, heard(wire, Cycle, "event") as client:
         wire.publisher.publish(ticks(200))
-        wire.publisher.event(contract.Event(101, "armed", 0, 0))
+        wire.publisher.event(contract.LoopEvent(101, "armed", 0, 0))
         assert [type(one) for one in take(client, 2)] == [Cycle, Event]
         assert client.status is not None  # always known, yielded only when asked for
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.contracts.record import WallRecord
 from hapticd.telemetry.wire import Cycles
+from hapticd.tick.record import WallRecord
 from tests.telemetry.sockets import ticks
 
 LAGGING = [(0, 0), (1, 0), (1, 1), (2, 1), (2, 2)]

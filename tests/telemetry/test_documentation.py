@@ -14,10 +14,10 @@ from xml.etree import ElementTree
 import pytest
 
 from hapticd import client
-from hapticd.contracts.event import Event
 from hapticd.telemetry import wire
-from hapticd.telemetry.status import LATE_EDGES_US, Status
+from hapticd.telemetry.records import LATE_EDGES_US, Status
 from hapticd.telemetry.wire import Topic
+from hapticd.tick.event import LoopEvent
 from tests.telemetry.sockets import Wire, served, ticks, wait_until
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
@@ -73,7 +73,7 @@ def printed_by(command: Sequence[str | Path]) -> list[str]:
         assert subscriber.stdout is not None
         wait_until(lambda: served(wire.publisher) >= 3, "three subscriptions")
         wire.publisher.publish([record for record in ticks(1020) if not 700 <= record.seq < 720])
-        wire.publisher.event(Event(103, "none -> tdpa", 1019, 0))
+        wire.publisher.event(LoopEvent(103, "none -> tdpa", 1019, 0))
         lines: list[str] = []
         while not lines or not lines[-1].startswith("event"):
             line = subscriber.stdout.readline()

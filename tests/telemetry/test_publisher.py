@@ -15,13 +15,13 @@ from typing import Any
 import pytest
 import zmq
 
-from hapticd.bench.telemetry import PERIOD_NS, measure, synthetic_info
 from hapticd.config.models import TelemetryConfig
-from hapticd.contracts.errors import InstanceError
-from hapticd.contracts.event import Event, EventCode
+from hapticd.errors import InstanceError
 from hapticd.telemetry import publisher as publishing
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.status import Status
+from hapticd.telemetry.records import Status
+from hapticd.tick.event import EventCode, LoopEvent
+from hapticd_bench.telemetry import PERIOD_NS, measure, synthetic_info
 from tests.telemetry.sockets import EPOCH_OFFSET_NS, Subscriber, Wire, seqs, served, ticks, wait_until
 
 EVERY_TICK = ("hapticd/position", "hapticd/energy", "hapticd/damping", "hapticd/timing")
@@ -64,7 +64,7 @@ def test_a_message_is_a_topic_and_an_array_of_maps_with_seconds_and_tick() -> No
     with Wire() as wire:
         subscriber = wire.subscribe()
         wire.publisher.publish(ticks(200))
-        wire.publisher.event(Event(EventCode.ARMED, "armed", 199, 0))
+        wire.publisher.event(LoopEvent(EventCode.ARMED, "armed", 199, 0))
         messages = subscriber.waiting()  # `message` checks frames, arrays, timestamps
         assert {topic for topic, _ in messages} == {*EVERY_TICK, "hapticd/cycle", "hapticd/event", "hapticd/status"}
         (first, *_), *_ = (maps for topic, maps in messages if topic == "hapticd/position")
@@ -84,7 +84,7 @@ def test_a_late_subscriber_gets_the_status_at_once() -> None:
 def test_a_subscriber_to_something_else_gets_no_status() -> None:
     with Wire() as wire:
         subscriber = wire.subscribe("hapticd/event")
-        wire.publisher.event(Event(EventCode.ARMED, "armed", 0, 0))
+        wire.publisher.event(LoopEvent(EventCode.ARMED, "armed", 0, 0))
         assert [topic for topic, _ in subscriber.waiting()] == ["hapticd/event"]
 
 
@@ -127,7 +127,7 @@ def test_decimation_thins_ticks_but_neither_cycles_nor_events() -> None:
             record.walls[0].cycle = record.seq
         wire.publisher.publish(records)
         for seq in range(5):
-            wire.publisher.event(Event(EventCode.OVERRUN_BURST, "late", seq, 0))
+            wire.publisher.event(LoopEvent(EventCode.OVERRUN_BURST, "late", seq, 0))
         wire.publisher.flush(sys.maxsize)
         received: Counter[str] = Counter()
         for topic, maps in subscriber.waiting():
@@ -210,7 +210,7 @@ def test_close_sends_the_last_words_and_leaves_nothing_behind() -> None:
     with Wire() as wire:
         subscriber = wire.subscribe("hapticd/position", "hapticd/event")
         wire.publisher.publish(ticks(5))
-        wire.publisher.event(Event(EventCode.STOPPING, "stopping", 5, 0))
+        wire.publisher.event(LoopEvent(EventCode.STOPPING, "stopping", 5, 0))
         wire.publisher.close()
         wire.publisher.close()
         assert not wire.path.exists()

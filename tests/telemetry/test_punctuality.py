@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.bench.telemetry import synthetic_info
 from hapticd.config.models import TelemetryConfig
-from hapticd.contracts.record import TickRecord
-from hapticd.supervisor.service import DRAIN_S, WAKE_NS, pause_s
+from hapticd.supervisor.daemon import DRAIN_S, WAKE_NS, pause_s
 from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.wire import Map, Topic
+from hapticd.tick.record import TickRecord
+from hapticd_bench.telemetry import synthetic_info
 from tests.telemetry.sockets import ticks
 
 PAGE = (Path(__file__).parents[2] / "docs" / "telemetry.md").read_text()

@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.telemetry.status import LATE_EDGES_US, LateHistogram, Status
+from hapticd.telemetry.records import LATE_EDGES_US, LateHistogram, Status
 
 
 def test_edges_double_from_ten_microseconds() -> None:

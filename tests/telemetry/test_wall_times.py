@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import WallConfig
-from hapticd.scene import Wall
-from hapticd.supervisor.walls import WallTimes
+from hapticd.tick.scene import Wall, WallTimes
 
 PERIOD_S = 1e-3
 TIMES = st.sets(st.one_of(st.integers(0, 30).map(lambda ms: ms * 1e-3), st.floats(0.0, 0.03)), max_size=5)

@@ -12,10 +12,10 @@ import msgpack
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.contracts.event import Event, EventCode
-from hapticd.contracts.record import RecordLayout, TickRecord, WallRecord
 from hapticd.telemetry import wire
 from hapticd.telemetry.wire import Map, Topic
+from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.record import RecordLayout, TickRecord, WallRecord
 from tests.telemetry.sockets import ticks
 
 ARRAYS = {"position_m", "velocity_m_per_s", "force_n", "force_requested_n"}
@@ -199,7 +199,7 @@ def test_a_new_scene_starts_counting_anew() -> None:
 )
 def test_whatever_an_event_carries_it_can_be_sent(fields: dict[str, Any], text: str, seq: int) -> None:
     """Also names that are taken, lone surrogates and integers beyond msgpack."""
-    event = Event(EventCode.DEVICE_LOST, text, seq, 0, fields)
+    event = LoopEvent(EventCode.DEVICE_LOST, text, seq, 0, fields)
     (back,) = msgpack.unpackb(wire.new_packer().pack([wire.event_map(event, 1.5)]))
     assert (back["timestamp"], back["seq"], back["code"]) == (1.5, seq, 204)
     assert set(back) >= {"timestamp", "seq", "code", "text"}
@@ -207,7 +207,7 @@ def test_whatever_an_event_carries_it_can_be_sent(fields: dict[str, Any], text: 
 
 
 def test_events_and_status_keep_their_names_and_lose_no_field() -> None:
-    event = Event(EventCode.SWITCHED, "none -> tdpa", 7, 0, {"law_index": 2, "old": "none", "peak_n": math.inf})
+    event = LoopEvent(EventCode.SWITCHED, "none -> tdpa", 7, 0, {"law_index": 2, "old": "none", "peak_n": math.inf})
     fields = {"law_index": 2, "old": "none", "peak_n": 0, "timestamp": 0.5, "seq": 7, "code": 103}
     assert wire.event_map(event, 0.5) == {**fields, "text": "none -> tdpa", "invalid": True}
     status = wire.status_map({"law": "tdpa", "late_histogram": (1, 2), "nested": {"a": math.nan}}, 0.5, 9, 10)

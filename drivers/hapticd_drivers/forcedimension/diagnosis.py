@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.errors import PluginError
+from hapticd.device import Diagnosis
+from hapticd.errors import PluginError
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.options import ForceDimensionOptions
 from hapticd_drivers.forcedimension.sdk import ADVISED, ENVIRONMENT, GET_SDK, Sdk, dotted

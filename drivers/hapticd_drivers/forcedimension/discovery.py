@@ -6,8 +6,8 @@ import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hapticd.contracts.device import FoundDevice
-from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, DriverError, PluginError
+from hapticd.device import FoundDevice
+from hapticd.errors import DeviceBusyError, DeviceNotFoundError, DriverError, PluginError
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.models import FALCON_TYPE, MODELS
 from hapticd_drivers.forcedimension.presence import Obstacle, UsbDevice

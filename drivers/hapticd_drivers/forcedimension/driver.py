@@ -10,12 +10,9 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 
-from hapticd.contracts.device import DeviceInfo, FoundDevice
-from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.driver import Driver, DriverState
-from hapticd.contracts.errors import ConfigError, DeviceFaultError, DriverStateError
-from hapticd.contracts.metric import Metric
-from hapticd.contracts.sample import Sample
+from hapticd.device import DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
+from hapticd.driver import Driver, DriverState
+from hapticd.errors import ConfigError, DeviceFaultError, DriverStateError
 from hapticd_drivers.forcedimension import diagnosis, discovery, presence, settings
 from hapticd_drivers.forcedimension.failures import TIMEOUT, cause_of
 from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ

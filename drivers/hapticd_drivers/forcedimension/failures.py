@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hapticd.contracts.errors import (
+from hapticd.errors import (
     DeviceBusyError,
     DeviceDisconnectedError,
     DeviceFaultError,

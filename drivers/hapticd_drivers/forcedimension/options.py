@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from hapticd.contracts.driver import DriverOptions
+from hapticd.driver import DriverOptions
 
 WATCHDOG_UNIT_MS = 0.125
 MOST_WATCHDOG_MS = 255 * WATCHDOG_UNIT_MS

@@ -11,7 +11,7 @@ from typing import Any
 
 import usb.core
 
-from hapticd.contracts.errors import (
+from hapticd.errors import (
     DeviceBusyError,
     DeviceNotFoundError,
     DevicePermissionError,

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hapticd.contracts.errors import DriverError, PluginError
+from hapticd.errors import DriverError, PluginError
 from hapticd_drivers.forcedimension.failures import failure
 from hapticd_drivers.forcedimension.prototypes import OPTIONAL, PROTOTYPES
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 
-from hapticd.contracts.errors import ConfigError, DeviceFaultError
+from hapticd.errors import ConfigError, DeviceFaultError
 from hapticd_drivers.forcedimension.failures import NOT_AVAILABLE
 from hapticd_drivers.forcedimension.options import MOST_WATCHDOG_MS, WATCHDOG_UNIT_MS, ForceDimensionOptions
 from hapticd_drivers.forcedimension.sdk import Sdk

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Protocol, TypeVar
 
-from hapticd.contracts.errors import DeviceDisconnectedError, DeviceProtocolError, DeviceTimeoutError, DriverError
+from hapticd.errors import DeviceDisconnectedError, DeviceProtocolError, DeviceTimeoutError, DriverError
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.link import Link
 from hapticd_drivers.rig.messages import Axis, Fault, Identity, Message, Pong, Refused, State, is_newer

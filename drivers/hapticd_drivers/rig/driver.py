@@ -8,9 +8,9 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, TypeVar
 
-from hapticd.contracts.device import DeviceInfo
-from hapticd.contracts.driver import Driver, DriverState
-from hapticd.contracts.errors import (
+from hapticd.device import DeviceInfo, Sample
+from hapticd.driver import Driver, DriverState
+from hapticd.errors import (
     ConfigError,
     DeviceFaultError,
     DeviceProtocolError,
@@ -18,7 +18,6 @@ from hapticd.contracts.errors import (
     DriverError,
     DriverStateError,
 )
-from hapticd.contracts.sample import Sample
 from hapticd_drivers.rig import messages, motion
 from hapticd_drivers.rig.conversation import Conversation
 from hapticd_drivers.rig.link import Link

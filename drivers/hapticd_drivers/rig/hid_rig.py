@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from hapticd.contracts.device import FoundDevice
-from hapticd.contracts.diagnosis import Diagnosis
+from hapticd.device import Diagnosis, FoundDevice
 from hapticd_drivers.rig import hid_rig_discovery as discovery
 from hapticd_drivers.rig.driver import RigDriver
 from hapticd_drivers.rig.hid_rig_link import HidLink

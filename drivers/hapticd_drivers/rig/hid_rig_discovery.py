@@ -14,9 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from hapticd.contracts.device import FoundDevice
-from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.errors import (
+from hapticd.device import Diagnosis, FoundDevice
+from hapticd.errors import (
     DeviceBusyError,
     DeviceDisconnectedError,
     DeviceNotFoundError,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
-from hapticd.contracts.errors import DeviceDisconnectedError
+from hapticd.errors import DeviceDisconnectedError
 from hapticd_drivers.rig.hid_rig_discovery import OpenHid
 from hapticd_drivers.rig.hid_rig_outbox import Outbox
 from hapticd_drivers.rig.messages import FORCE, LONGEST, PING, POLL, SHORTEST, is_intact

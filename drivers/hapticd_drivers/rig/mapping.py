@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hapticd.contracts.errors import ConfigError
+from hapticd.errors import ConfigError
 from hapticd_drivers.rig.messages import Axis
 from hapticd_drivers.rig.options import AxisOptions
 

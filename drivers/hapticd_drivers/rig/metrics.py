@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hapticd.contracts.metric import Metric
+from hapticd.device import Metric
 
 METRICS = (
     Metric("echo_us", "from sending the newest command that was echoed to reading the echo [us]"),

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from hapticd.contracts.errors import DeviceFaultError
+from hapticd.errors import DeviceFaultError
 
 NUDGE_M = 0.5e-3
 NUDGE_COUNTS = 8

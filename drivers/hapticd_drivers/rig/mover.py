@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from hapticd.contracts.errors import DeviceTimeoutError, DriverError, DriverStateError
+from hapticd.errors import DeviceTimeoutError, DriverError, DriverStateError
 from hapticd_drivers.rig.conversation import Conversation
 from hapticd_drivers.rig.mapping import AxisMap
 from hapticd_drivers.rig.messages import ENABLED, HOME_SWITCH_CLOSED, State

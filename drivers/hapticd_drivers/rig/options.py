@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from hapticd.contracts.driver import DriverOptions
-from hapticd.contracts.table import Table
+from hapticd.driver import DriverOptions
+from hapticd.settings import Table
 from hapticd_drivers.rig.messages import MOST_AXES
 
 Homing = Literal["low_stop", "high_stop", "low_switch", "high_switch", "here"]

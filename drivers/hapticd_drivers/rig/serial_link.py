@@ -14,7 +14,7 @@ from pathlib import Path
 
 import serial
 
-from hapticd.contracts.errors import (
+from hapticd.errors import (
     DeviceBusyError,
     DeviceDisconnectedError,
     DeviceNotFoundError,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
-from hapticd.contracts.errors import DeviceNotFoundError
+from hapticd.errors import DeviceNotFoundError
 
 AUTO = "auto"
 PATTERN = r"auto|/.+|usb:[0-9a-fA-F]{4}:[0-9a-fA-F]{4}(:.+)?"

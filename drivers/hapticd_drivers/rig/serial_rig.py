@@ -7,9 +7,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from hapticd.contracts.device import FoundDevice
-from hapticd.contracts.diagnosis import Diagnosis
-from hapticd.contracts.errors import ConfigError, DeviceNotFoundError
+from hapticd.device import Diagnosis, FoundDevice
+from hapticd.errors import ConfigError, DeviceNotFoundError
 from hapticd_drivers.rig import serial_ports
 from hapticd_drivers.rig.driver import RigDriver
 from hapticd_drivers.rig.link import Link

@@ -6,9 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from types import ModuleType
 
-from hapticd.contracts.errors import ConfigError
-from hapticd.contracts.law import state_fields
-from hapticd.energy import EnergyLedger
+from hapticd.errors import ConfigError
+from hapticd.law import state_fields
 from hapticd.simulation.batch.arrays import Arrays, arrays_of
 from hapticd.simulation.batch.fields import plain, store
 from hapticd.simulation.batch.kernel import LoopBuffers, bound
@@ -16,8 +15,9 @@ from hapticd.simulation.batch.machine_code import machine_code
 from hapticd.simulation.batch.point import Point
 from hapticd.simulation.batch.prepare import Prepared
 from hapticd.simulation.batch.result import BatchResult, result_of
+from hapticd.simulation.compiler.threads import in_threads
 from hapticd.simulation.plant import Buffers, terms
-from hapticd.simulation.threads import in_threads
+from hapticd.tick.energy import EnergyLedger
 
 
 class Batch:

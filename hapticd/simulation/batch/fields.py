@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hapticd.contracts.law import plain_object
-from hapticd.simulation.compile import record_dtype
+from hapticd.law import plain_object
+from hapticd.simulation.compiler.compile import record_dtype
 
 
 @lru_cache

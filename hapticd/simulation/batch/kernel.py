@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.plant import move, sense
-from hapticd.simulation.specialise import specialise
 
 WALL_DAMPING: bool = True
 LONG_VELOCITY: bool = True
@@ -218,7 +218,7 @@ def run(
 
 
 def long_difference(loop: Any, params: Any, history: Any, position_m: float) -> float:
-    """`hapticd.velocity.LongDifference`, step by step, times included: its sums decide the last bit."""
+    """`hapticd.tick.velocity.LongDifference`, step by step, times included: its sums decide the last bit."""
     size = params.samples + 1
     last_s = history.time_s[loop.newest]
     if last_s > 10.0:

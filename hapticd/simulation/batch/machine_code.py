@@ -8,10 +8,10 @@ from typing import Any
 
 from numba import njit
 
-from hapticd.energy import EnergyLedger
 from hapticd.simulation.batch.kernel import LoopBuffers, bound
-from hapticd.simulation.compile import OPTIONS, compiled, compiled_step, on_stack
+from hapticd.simulation.compiler.compile import OPTIONS, compiled, compiled_step, on_stack
 from hapticd.simulation.plant import Buffers
+from hapticd.tick.energy import EnergyLedger
 
 
 @lru_cache(maxsize=32)

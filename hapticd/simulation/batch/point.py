@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from hapticd.config.models import WallConfig
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 from hapticd.simulation.options import SimulationOptions
 
 

@@ -6,14 +6,15 @@ import math
 from types import ModuleType
 from typing import Any
 
-from hapticd.contracts.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params, state_fields
+from hapticd.config.timing import first_tick
+from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params, state_fields
 from hapticd.simulation.batch.fields import fields_of, hints, plain
 from hapticd.simulation.batch.kernel import LoopState
 from hapticd.simulation.batch.point import Point
-from hapticd.simulation.compile import param_kinds
+from hapticd.simulation.compiler.compile import param_kinds
+from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.options import ConstantForce
 from hapticd.simulation.plant import delay_line, epochs, recorded_points, sense, start_state, terms
-from hapticd.simulation.specialise import specialise
 
 
 class Prepared:
@@ -78,7 +79,7 @@ class Prepared:
         for change in point.wall.changes:
             stiffness = stiffness if change.stiffness_n_per_m is None else change.stiffness_n_per_m
             damping = damping if change.damping_n_s_per_m is None else change.damping_n_s_per_m
-            wall[math.ceil(change.at_s / point.period_s - 1e-6)] = (stiffness, damping)
+            wall[first_tick(change.at_s, point.period_s)] = (stiffness, damping)
         starts = sorted({*wall, *epoch_starts, self.ticks - self.window})
         found = []
         for start, stop in zip(starts, [*starts[1:], self.ticks], strict=True):

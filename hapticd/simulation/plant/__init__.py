@@ -8,7 +8,7 @@ interpreted and compiled with equal results to the last bit. Switches in capital
 """
 
 from hapticd.simulation.plant.arithmetic import sine
-from hapticd.simulation.plant.coefficients import delay_line, epochs, first_tick, start_state, terms
+from hapticd.simulation.plant.coefficients import delay_line, epochs, start_state, terms
 from hapticd.simulation.plant.hand import recorded_points
 from hapticd.simulation.plant.hold import flow
 from hapticd.simulation.plant.state import Buffers, PlantParams, PlantState
@@ -22,7 +22,6 @@ __all__ = [
     "PlantState",
     "delay_line",
     "epochs",
-    "first_tick",
     "flow",
     "move",
     "recorded_points",

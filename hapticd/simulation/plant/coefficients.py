@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from hapticd.simulation.options import Change, SimulationOptions
+from hapticd.config.timing import first_tick
+from hapticd.simulation.options import SimulationOptions
 from hapticd.simulation.plant.hand import hand_fields, hand_terms
 from hapticd.simulation.plant.hold import flow
 from hapticd.simulation.plant.stepped import METHODS
@@ -55,13 +56,8 @@ def epochs(options: SimulationOptions, period_s: float) -> list[tuple[int, dict[
     found: dict[int, dict[str, float | int]] = {0: _params(options, values, period_s)}
     for change in options.changes:
         values.update(change.values())
-        found[first_tick(change, period_s)] = _params(options, values, period_s)
+        found[first_tick(change.at_s, period_s)] = _params(options, values, period_s)
     return sorted(found.items())
-
-
-def first_tick(change: Change, period_s: float) -> int:
-    """The first period that starts at or after a change."""
-    return max(0, math.ceil(change.at_s / period_s - 1e-6))
 
 
 def terms(options: SimulationOptions) -> dict[str, bool]:

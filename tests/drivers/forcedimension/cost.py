@@ -12,8 +12,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from hapticd.bench.tick.bodies import ROUNDS, Bodies, measure_bodies
-from hapticd.bench.tick.case import Case, scene
+from hapticd_bench.tick.bodies import ROUNDS, Bodies, measure_bodies
+from hapticd_bench.tick.case import Case, scene
 from tests.drivers.forcedimension.bench import Bench
 from tests.drivers.forcedimension.building import build
 from tests.drivers.forcedimension.lab import PRESS_N, SLOW, config, press

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from hapticd.contracts.errors import PluginError
+from hapticd.errors import PluginError
 from hapticd_drivers.forcedimension import sdk as sdk_module
 from hapticd_drivers.forcedimension.prototypes import OPTIONAL, PROTOTYPES, STATUS_WORDS
 from hapticd_drivers.forcedimension.sdk import Sdk

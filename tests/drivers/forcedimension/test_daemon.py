@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.contracts.event import EventCode
+from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, Subscriber, wait_until
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, RESET, SOFTWARE, WATCHDOG, Bench
 from tests.drivers.forcedimension.lab import PRESS_N, Lab, rest_of

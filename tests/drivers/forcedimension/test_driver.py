@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from hapticd.contracts.driver import DriverState
-from hapticd.contracts.errors import (
+from hapticd.driver import DriverState
+from hapticd.errors import (
     ConfigError,
     DeviceFaultError,
     DeviceNotFoundError,
@@ -17,7 +17,7 @@ from hapticd.contracts.errors import (
     DriverError,
     DriverStateError,
 )
-from hapticd.registry import driver as installed
+from hapticd.plugins import driver as installed
 from hapticd_drivers.forcedimension.driver import STOP_ATTEMPTS, ForceDimension
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, IDLE, LEFT, RIGHT, Bench
 

@@ -10,12 +10,12 @@ from collections.abc import Callable
 import pytest
 
 from hapticd.config.loading import parse
-from hapticd.contracts.driver import DriverState
-from hapticd.contracts.errors import DeviceDisconnectedError, DeviceFaultError, DriverError
-from hapticd.contracts.event import EventCode
-from hapticd.control.process import make_tick
-from hapticd.control.tick import FROZEN_TICKS, ControlTick
-from hapticd.guard import Mode
+from hapticd.driver import DriverState
+from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DriverError
+from hapticd.tick.assemble import make_tick
+from hapticd.tick.event import EventCode
+from hapticd.tick.guard import Mode
+from hapticd.tick.tick import FROZEN_TICKS, ControlTick
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, Bench
 

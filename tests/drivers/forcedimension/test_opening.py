@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.contracts.driver import DriverState
-from hapticd.contracts.errors import ConfigError, DeviceBusyError, DeviceNotFoundError, PluginError
+from hapticd.driver import DriverState
+from hapticd.errors import ConfigError, DeviceBusyError, DeviceNotFoundError, PluginError
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from hapticd_drivers.forcedimension.models import MODELS
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, RIGHT, Bench

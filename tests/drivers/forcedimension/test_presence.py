@@ -14,7 +14,7 @@ import pytest
 import usb.backend
 import usb.core
 
-from hapticd.contracts.errors import DeviceBusyError, DeviceNotFoundError, DevicePermissionError
+from hapticd.errors import DeviceBusyError, DeviceNotFoundError, DevicePermissionError
 from hapticd_drivers.forcedimension import presence
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from hapticd_drivers.forcedimension.options import ForceDimensionOptions

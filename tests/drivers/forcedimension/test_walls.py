@@ -8,13 +8,13 @@ import pytest
 
 from hapticd.config.loading import parse
 from hapticd.config.models import MAX_WALLS
-from hapticd.contracts.event import EventCode
-from hapticd.contracts.record import RecordLayout
-from hapticd.control.loop import ControlLoop
-from hapticd.control.process import make_tick
-from hapticd.control.shared import EventReader, RecordReader, SharedMemory
+from hapticd.loop.loop import ControlLoop
+from hapticd.loop.memory import EventReader, RecordReader, SharedMemory
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
+from hapticd.tick.assemble import make_tick
+from hapticd.tick.event import EventCode
+from hapticd.tick.record import RecordLayout
 from tests.drivers.forcedimension.bench import LEFT, RIGHT, Bench
 from tests.drivers.forcedimension.lab import AXES, Rest, config, press, rest_of
 
@@ -65,7 +65,7 @@ def run(
     info = driver.open()
     ticks = round(seconds * rate_hz)
     clock = DeviceTime(ticks)
-    monkeypatch.setattr("hapticd.control.loop.time", clock)
+    monkeypatch.setattr("hapticd.loop.loop.time", clock)
     shared = SharedMemory(RecordLayout(3, info.has_orientation, MAX_WALLS), rate_hz)
     tick = make_tick(loaded, info)
     control = clock.loop = ControlLoop(driver, tick, shared, loop, loaded.config.safety, True, clock.sleep_until)

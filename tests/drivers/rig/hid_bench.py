@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from hapticd.contracts.driver import Driver
+from hapticd.driver import Driver
 from hapticd_drivers.rig.hid_rig import HidRig
 from hapticd_drivers.rig.hid_rig_options import HidRigOptions
 from tests.daemon.running import wait_until

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.contracts.driver import DriverState
-from hapticd.contracts.errors import (
+from hapticd.driver import DriverState
+from hapticd.errors import (
     DeviceBusyError,
     DeviceDisconnectedError,
     DeviceFaultError,

@@ -14,7 +14,7 @@ from statistics import median
 
 import pytest
 
-from hapticd.contracts.event import EventCode
+from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.daemon.test_commands import ask
 from tests.drivers.rig.hid_bench import SERIAL, HidDouble, build

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from hapticd.contracts.errors import DeviceNotFoundError, DevicePermissionError
+from hapticd.errors import DeviceNotFoundError, DevicePermissionError
 from hapticd_drivers.rig import hid_rig_discovery as discovery
 from hapticd_drivers.rig.hid_rig_link import HidLink
 from hapticd_drivers.rig.hid_rig_options import HidRigOptions

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.contracts.errors import DeviceDisconnectedError
+from hapticd.errors import DeviceDisconnectedError
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.hid_rig_discovery import HidDevice, OpenHid
 from hapticd_drivers.rig.hid_rig_link import MOST_READ, HidLink

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.contracts.errors import ConfigError
+from hapticd.errors import ConfigError
 from hapticd_drivers.rig.mapping import AxisMap
 from hapticd_drivers.rig.messages import Axis
 from hapticd_drivers.rig.options import AxisOptions

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.contracts.errors import DeviceFaultError
+from hapticd.errors import DeviceFaultError
 from hapticd_drivers.rig import motion
 from hapticd_drivers.rig.motion import Drive, Moment
 

@@ -15,7 +15,7 @@ import msgpack
 import pytest
 import zmq
 
-from hapticd.contracts.event import EventCode
+from hapticd.tick.event import EventCode
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.firmware.board import Board, Built
 

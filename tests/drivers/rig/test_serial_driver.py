@@ -11,8 +11,8 @@ from typing import Protocol
 
 import pytest
 
-from hapticd.contracts.driver import DriverState
-from hapticd.contracts.errors import (
+from hapticd.driver import DriverState
+from hapticd.errors import (
     ConfigError,
     DeviceBusyError,
     DeviceDisconnectedError,

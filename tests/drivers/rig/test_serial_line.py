@@ -15,7 +15,7 @@ import pytest
 from pydantic import ValidationError
 from serial.tools import list_ports
 
-from hapticd.contracts.errors import DeviceDisconnectedError, DeviceNotFoundError, DevicePermissionError
+from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DevicePermissionError
 from hapticd_drivers.rig import messages, serial_link, serial_ports
 from hapticd_drivers.rig.frames import FrameReader
 from hapticd_drivers.rig.serial_link import SerialLink

@@ -1,0 +1,1 @@
+"""The commands `hapticd bench ...`, thin modules over the measurements."""

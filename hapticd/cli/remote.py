@@ -1,0 +1,129 @@
+"""Requests to a running daemon: `hapticd arm`, `disarm`, `calibrate`, `tare`, `clear`, `reload`.
+
+Also the options that say which daemon: one of this computer by its name, or another computer's by its endpoint.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hapticd.client.commands import command
+from hapticd.paths import DEFAULT_INSTANCE
+
+CALIBRATION_TIMEOUT_S = 120.0
+"""How long a device may take to calibrate [s]."""
+
+Instance = Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.")]
+Connect = Annotated[
+    str | None,
+    typer.Option("--connect", metavar="ENDPOINT", help="The daemon's control.tcp, tcp://HOST:PORT, instead of a name."),
+]
+Keys = Annotated[
+    Path | None,
+    typer.Option("--keys", metavar="FILE", help="Your key file for an endpoint; $HAPTICD_KEYS when not given."),
+]
+
+
+def arm(
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Let a running daemon apply forces.
+
+    The device is enabled, and a wall that is already pressed comes in by a ramp.
+
+    Example: hapticd arm --instance left
+    """
+    command("arm", instance, connect=connect, keys=keys)
+
+
+def disarm(
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Ramp the force of a running daemon to zero.
+
+    Positions go on streaming.
+
+    Example: hapticd disarm --instance left
+    """
+    command("disarm", instance, connect=connect, keys=keys)
+
+
+def clear(
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Clear the fault that stopped a running daemon.
+
+    The device stays disarmed until `hapticd arm`.
+
+    Example: hapticd clear --instance left
+    """
+    command("clear", instance, connect=connect, keys=keys)
+
+
+def tare(
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Take the present position as the scene's origin.
+
+    Positions count from here on every axis, and the walls stand relative to it, until the device is calibrated, lost
+    or opened anew. The daemon must be disarmed: no wall moves under a hand that it pushes.
+
+    Example: hapticd tare
+    """
+    command("tare", instance, connect=connect, keys=keys)
+
+
+def calibrate(
+    instance: Instance = DEFAULT_INSTANCE,
+    countdown_s: Annotated[int, typer.Option("--countdown", min=0, max=60, help="Seconds to clear the workspace.")] = 5,
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Calibrate a running daemon's device, which moves its arm.
+
+    Let go of the arm and clear its workspace. Ctrl-C calls it off, during the countdown and afterwards, and so does
+    `hapticd disarm`. The daemon must be disarmed, and goes on streaming positions.
+
+    Example: hapticd calibrate --countdown 10
+    """
+    command("status", instance, connect=connect, keys=keys)  # nobody clears a workspace for a daemon that is not there
+    for left_s in range(countdown_s, 0, -1):
+        typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
+        time.sleep(1.0)
+    typer.echo("calibrating", err=True)
+    try:
+        command("calibrate", instance, CALIBRATION_TIMEOUT_S, connect, keys)
+    except KeyboardInterrupt:
+        command("disarm", instance, connect=connect, keys=keys)
+        typer.echo("called off", err=True)
+        raise
+
+
+def reload(
+    instance: Instance = DEFAULT_INSTANCE,
+    wait: bool = typer.Option(
+        False, "--wait", help="Wait for the verdict; a refused file is printed and exits with 2."
+    ),
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Let a running daemon take its edited file over.
+
+    Law, walls, limits and telemetry decimation change between two ticks, without a step in force; a file that cannot
+    be used, or that changes what needs a restart, is refused and changes nothing.
+
+    Example: hapticd reload --wait
+    """
+    command("reload", instance, connect=connect, keys=keys, wait=wait)

@@ -1,0 +1,1 @@
+"""`hapticd watch`: a live view of what a daemon measures."""

@@ -1,0 +1,441 @@
+"""The picture that `hapticd watch` shows: what is known of a daemon, and how it looks on so many lines."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+import time
+from collections import deque
+from collections.abc import Sequence
+
+from rich.text import Text
+
+from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, Trace, bars, plot
+from hapticd.client import Cycle, Damping, Energy, Event, Gap, Position, Record, Status
+from hapticd.telemetry.records import LATE_EDGES_US
+
+SILENT_S = 2.5
+"""A daemon that has said nothing for so long is gone: it says its status every second."""
+
+LATE_US = 160
+"""Ticks that started at least so late are counted as late; an edge of the histogram."""
+
+_AXIS_STYLES = ("cyan", "magenta", "green")
+_REQUESTED = "red"
+_QUIET = "bright_black"
+_HISTORY_S = 1.0  # between two bars of a wall's damping
+_NARROW = 64
+_CYCLES_WIDTH = 36
+_PREFIXES = ((1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_MOST_WALLS = 4
+
+
+class ScreenState:
+    """What is known of a daemon from the records that have come.
+
+    Attributes:
+        status: its latest status, None before the first.
+        position, energy, damping: its latest tick.
+        cycles, events: the latest ones, newest first.
+        heard_s: when anything came last, on the caller's clock [s].
+        lost: ticks that this viewer did not get.
+    """
+
+    def __init__(self) -> None:
+        self.status: Status | None = None
+        self.position: Position | None = None
+        self.energy: Energy | None = None
+        self.damping: Damping | None = None
+        self.cycles: deque[Cycle] = deque(maxlen=100)
+        self.events: deque[Event] = deque(maxlen=100)
+        self.heard_s = -math.inf
+        self.lost = 0
+        self.positions = Trace(0)
+        self.forces = Trace(0)
+        self.dampings: list[deque[float]] = []
+        self._damping_due_s = 0.0
+
+    def take(self, records: Sequence[Record], now_s: float) -> None:
+        """Learn from what came.
+
+        Args:
+            records: in the order in which they came.
+            now_s: the caller's clock [s].
+        """
+        if records:
+            self.heard_s = now_s
+        for record in records:
+            match record:
+                case Position():
+                    self._take_position(record)
+                case Energy():
+                    self.energy = record
+                case Damping():
+                    self._take_damping(record)
+                case Cycle():
+                    self.cycles.appendleft(record)
+                case Event():
+                    self.events.appendleft(record)
+                case Status():
+                    self.status = record
+                case Gap() if record.topic == Position.topic:
+                    self.lost += record.missing
+                case _:
+                    pass
+
+    def _take_position(self, position: Position) -> None:
+        if self.positions.series != len(position.position_m):
+            self.positions = Trace(len(position.position_m))
+            self.forces = Trace(2 * len(position.position_m))
+        self.positions.add(position.timestamp, position.position_m)
+        self.forces.add(position.timestamp, position.force_requested_n + position.force_n)
+        self.position = position
+
+    def _take_damping(self, damping: Damping) -> None:
+        self.damping = damping
+        if len(self.dampings) != len(damping.damping_n_s_per_m):
+            self.dampings = [deque(maxlen=8) for _ in damping.damping_n_s_per_m]
+        if abs(damping.timestamp - self._damping_due_s) >= _HISTORY_S:
+            self._damping_due_s = damping.timestamp
+            for history, value in zip(self.dampings, damping.damping_n_s_per_m, strict=True):
+                history.append(value)
+
+
+def frame(known: ScreenState, endpoint: str, width: int, height: int, now_s: float) -> list[Text]:
+    """The picture: exactly so many lines of exactly so many characters.
+
+    Args:
+        known: what to show.
+        endpoint: where it comes from.
+        width: characters of a line.
+        height: lines.
+        now_s: the clock that `known` was fed with [s].
+    """
+    if known.status is None:
+        lines = waiting(endpoint, width, height)
+    else:
+        lines = _running(known, known.status, endpoint, width, height, now_s)
+    lines = (lines + [Text("")] * height)[:height]
+    for line in lines:
+        line.no_wrap = True
+        line.truncate(width, overflow="ellipsis", pad=True)
+    return lines
+
+
+def waiting(endpoint: str, width: int, height: int) -> list[Text]:
+    """The picture while there is no daemon."""
+    text = [
+        Text("waiting for a daemon", style="bold", justify="center"),
+        Text(endpoint, style="cyan"),
+        Text(""),
+        Text("start one with  hapticd run  or  systemctl start hapticd", style=_QUIET),
+        Text("q quits", style=_QUIET),
+    ]
+    above = [Text("")] * max(0, (height - len(text)) // 2)
+    return above + [Text(" " * max(0, (width - line.cell_len) // 2)).append_text(line) for line in text]
+
+
+def one_line(known: ScreenState) -> str:
+    """State and latest tick in one plain line."""
+    status = known.status
+    assert status is not None
+    stamp = known.position.timestamp if known.position else status.timestamp
+    parts = [
+        time.strftime("%H:%M:%S", time.localtime(stamp)),
+        f"{_state(status)[0].lower():8}",
+        status.law,
+        f"{status.measured_rate_hz:.1f} Hz",
+        f"late {late_ticks(status)}",
+        f"skipped {status.overruns}",
+    ]
+    if known.position:
+        parts += [
+            f"{name} {1e3 * x_m:+.3f} mm {force_n:+.2f} N"
+            for name, x_m, force_n in zip(
+                _axes(status, known.position), known.position.position_m, known.position.force_n, strict=False
+            )
+        ]
+    if known.damping:
+        parts += [f"damping {damping:.1f} N s/m" for damping in known.damping.damping_n_s_per_m]
+    if known.energy:
+        parts += [f"energy {si(known.energy.energy_j, 'J')}", f"generated {si(known.energy.generated_j, 'J')}"]
+    return "  ".join(parts)
+
+
+def late_ticks(status: Status) -> int:
+    """Ticks at least `LATE_US` late."""
+    return sum(status.late_histogram[LATE_EDGES_US.index(LATE_US) + 1 :])
+
+
+def si(value: float, unit: str) -> str:
+    """Three digits with a prefix: 12.3 mJ."""
+    if value == 0.0:
+        return f"0 {unit}"
+    factor, prefix = next((one for one in _PREFIXES if abs(value) >= 0.9995 * one[0]), _PREFIXES[-1])
+    scaled = value / factor
+    digits = 2 if abs(scaled) < 9.995 else 1 if abs(scaled) < 99.95 else 0
+    return f"{scaled:.{digits}f} {prefix}{unit}"
+
+
+def _running(known: ScreenState, status: Status, endpoint: str, width: int, height: int, now_s: float) -> list[Text]:
+    above = [_header(status, known, width, now_s), *_warnings(status), _loop(known, status, width), *_device(status)]
+    above += _model(status, width)
+    middle = [*_walls(known, status, width), _energy(known, width)]
+    footer = _footer(status, endpoint, width)
+    room = height - len(above) - len(middle) - 1
+    log_rows = 0 if room < 9 else min(12, 3 + max(0, (room - 12) // 3))
+    plot_height = room - (log_rows + 2 if log_rows else 0)
+    plots = _plots(known, status, width, plot_height)
+    logs = _logs(known, width, log_rows) if log_rows else []
+    return [*above, *plots, *middle, *logs, footer]
+
+
+def _header(status: Status, known: ScreenState, width: int, now_s: float) -> Text:
+    name, style = _state(status)
+    silent_s = now_s - known.heard_s
+    if silent_s > SILENT_S:
+        name, style = f"NO DATA FOR {silent_s:.0f} s", "bold white on red"
+    left = Text(" ").append(f" hapticd {status.instance} ", "bold reverse").append(f"  {status.device}", "bold")
+    driver = f"  {status.driver}{', simulated' if status.simulated else ''}"
+    right = Text(f"law {status.law}  ", style="bold").append(f" {name} ", style).append(" ")
+    if left.cell_len + len(driver) + right.cell_len < width:
+        left.append(driver, _QUIET)
+    return _spread(left, right, width)
+
+
+def _state(status: Status) -> tuple[str, str]:
+    if status.latched:
+        return "LATCHED", "bold white on red"
+    if status.fallback:
+        return "FALLBACK", "bold white on magenta"
+    if status.releasing:
+        return "RELEASING", "bold black on yellow"
+    if status.armed:
+        return "ARMED", "bold black on green"
+    return "DISARMED", "bold black on yellow"
+
+
+def _warnings(status: Status) -> list[Text]:
+    """Standing warnings, at most two lines, and what a latched fault asks for."""
+    lines = list(status.warnings)
+    if not status.calibrated:
+        lines.insert(0, "not calibrated, so without force: clear its workspace, then  hapticd calibrate")
+    if status.latched:
+        lines.insert(0, "stopped by a fault: see events below, then  hapticd clear")
+    if len(lines) > 2:
+        lines = [lines[0], f"{lines[1]}  (and {len(lines) - 2} more: hapticd doctor)"]
+    return [Text(f" ⚠ {line}", style="yellow") for line in lines]
+
+
+def _loop(known: ScreenState, status: Status, width: int) -> Text:
+    line = _quiet(" loop ")
+    off = abs(status.measured_rate_hz - status.rate_hz) > 0.01 * status.rate_hz
+    line.append(f"{status.measured_rate_hz:.1f}", "bold yellow" if off else "bold").append(f" of {status.rate_hz:g} Hz")
+    if status.late_histogram:
+        if width > _NARROW:
+            line.append("  late ", _QUIET).append_text(_late_bars(status))
+            line.append(" max ", _QUIET).append(si(status.late_max_us * 1e-6, "s"))
+        line.append("  late ticks ", _QUIET).append_text(_count(late_ticks(status), "yellow"))
+    line.append("  skipped ", _QUIET).append_text(_count(status.overruns, "yellow"))
+    lost = status.ring_drops + known.lost
+    if lost:
+        line.append("  lost ", _QUIET).append_text(_count(lost, "red"))
+    extra = _quiet("  busy max ").append(si(status.busy_max_us * 1e-6, "s"), "default")
+    return line.append_text(extra) if line.cell_len + extra.cell_len <= width else line
+
+
+def _device(status: Status) -> list[Text]:
+    """What the driver counts, where it counts anything."""
+    if not status.device_metrics:
+        return []
+    line = _quiet(" device")
+    for name, value in status.device_metrics.items():
+        line.append(f"  {name} ", _QUIET).append(f"{value:.10g}")
+    return [line]
+
+
+def _model(status: Status, width: int) -> list[Text]:
+    """The device model, where an accuracy was asked for."""
+    return [_quiet(f" {line}") for line in textwrap.wrap(status.accuracy, max(20, width - 2))]
+
+
+def _late_bars(status: Status) -> Text:
+    """Ticks by lateness, 10 us to 10 ms, counts on a logarithmic scale; red is a period of 1 kHz and more."""
+    heights = [math.log10(1.0 + count) for count in status.late_histogram]
+    text = Text("")
+    for index, bar in enumerate(bars(heights)):
+        lower_us = LATE_EDGES_US[index - 1] if index else 0
+        text.append(
+            bar if bar != " " else "·", "green" if lower_us < LATE_US else "yellow" if lower_us < 1280 else "red"
+        )
+        if bar == " ":
+            text.stylize(_QUIET, len(text) - 1)
+    return text
+
+
+def _count(count: int, alarm: str) -> Text:
+    return Text(f"{count}", style=f"bold {alarm}" if count else "default")
+
+
+def _plots(known: ScreenState, status: Status, width: int, height: int) -> list[Text]:
+    if height < 4 or known.position is None:
+        return []
+    if width < _NARROW:
+        upper = height // 2
+        if upper < 4:
+            return _position_box(known, status, width, height)
+        return _position_box(known, status, width, upper) + _force_box(known, status, width, height - upper)
+    left = width // 2
+    return _beside(_position_box(known, status, left, height), _force_box(known, status, width - left, height))
+
+
+def _position_box(known: ScreenState, status: Status, width: int, height: int) -> list[Text]:
+    assert known.position is not None
+    axes = _axes(status, known.position)
+    titles = [f"{name} {1e3 * value:+.3f}" for name, value in zip(axes, known.position.position_m, strict=False)]
+    single = len(axes) == 1  # wherever the scene puts the wall
+    walls = [
+        1e3 * position
+        for axis, position in zip(status.wall_axis, status.wall_position_m, strict=False)
+        if single or axis in axes
+    ]
+    rows = plot(known.positions, width - 4, height - 2, _AXIS_STYLES, scale=1e3, least=0.1, marks=walls)
+    return _box("position", _coloured(titles, " mm"), rows, width)
+
+
+def _force_box(known: ScreenState, status: Status, width: int, height: int) -> list[Text]:
+    assert known.position is not None
+    axes = _axes(status, known.position)
+    titles = [f"{name} {value:+.2f}" for name, value in zip(axes, known.position.force_n, strict=False)]
+    # Without forces at all nothing is limited: the state in the first line says it.
+    limited = status.armed and known.position.force_n != known.position.force_requested_n
+    styles = [_REQUESTED] * len(axes) + [_AXIS_STYLES[index % 3] for index in range(len(axes))]
+    rows = plot(known.forces, width - 4, height - 2, styles, least=1.0, ruling=len(axes), marks=(0.0,))
+    title = _coloured(titles, " N")
+    if limited:
+        title = Text("limited ", style=_REQUESTED).append_text(title)
+    return _box("force", title, rows, width)
+
+
+def _axes(status: Status, position: Position) -> tuple[str, ...]:
+    """Names of the axes; a device with a single one has it where the first wall is."""
+    names = status.axes
+    if len(names) == 1 and status.wall_axis:
+        names = status.wall_axis[:1]
+    return names + tuple(str(index) for index in range(len(names), len(position.position_m)))
+
+
+def _coloured(titles: Sequence[str], unit: str) -> Text:
+    text = Text("")
+    for index, title in enumerate(titles):
+        text.append("  " if index else "").append(title, f"bold {_AXIS_STYLES[index % 3]}")
+    return text.append(unit, _QUIET)
+
+
+def _walls(known: ScreenState, status: Status, width: int) -> list[Text]:
+    damping = known.damping
+    if damping is None or not damping.damping_n_s_per_m:
+        return [Text(" no walls in the scene", style=_QUIET)] if damping else []
+    lines = []
+    count = len(damping.damping_n_s_per_m)
+    for index in range(min(count, _MOST_WALLS)):
+        line = _quiet(" wall ").append(f"{index}", "bold")
+        if index < len(status.wall_axis):
+            line.append(f" {status.wall_axis[index]}")
+        if index < len(status.wall_stiffness_n_per_m):
+            line.append(f" {si(status.wall_stiffness_n_per_m[index], 'N/m'):>9}")
+        line.append(
+            "  ● inside " if damping.in_contact[index] else "  ○ outside",
+            "bold cyan" if damping.in_contact[index] else _QUIET,
+        )
+        line.append("  damping ", _QUIET).append(f"{damping.damping_n_s_per_m[index]:6.1f}", "bold").append(" N s/m ")
+        line.append(f"{bars([max(0.0, value) for value in known.dampings[index]]):<8}", "green")
+        mass = damping.felt_mass_kg[index]
+        line.append(" felt mass ", _QUIET)
+        line.append(f"{mass:.3f} kg" if mass else "unknown", "bold" if mass else _QUIET)
+        lines.append(line)
+    if count > _MOST_WALLS:
+        lines[-1] = _spread(lines[-1], Text(f"+{count - _MOST_WALLS} walls ", style=_QUIET), width)
+    return lines
+
+
+def _energy(known: ScreenState, width: int) -> Text:
+    energy = known.energy
+    line = _quiet(" energy ")
+    if energy is None:
+        return line
+    gap = "  " if width < 90 else "     "
+    line.append("in ", _QUIET).append(f"{si(energy.energy_j, 'J'):<8}", "bold")
+    line.append(f"{gap}springs ", _QUIET).append(f"{si(energy.spring_energy_j, 'J'):<8}")
+    line.append(f"{gap}dissipated ", _QUIET).append(f"{si(energy.dissipated_j, 'J'):<8}")
+    made = energy.generated_j > 0.0
+    return line.append(f"{gap}generated ", _QUIET).append(si(energy.generated_j, "J"), "bold yellow" if made else "")
+
+
+def _logs(known: ScreenState, width: int, rows: int) -> list[Text]:
+    if width < _NARROW:
+        return _box("events", Text(""), _event_rows(known, rows), width)
+    left = _CYCLES_WIDTH
+    cycles = _box("cycles", Text(""), _cycle_rows(known, rows), left)
+    return _beside(cycles, _box("events", Text(""), _event_rows(known, rows), width - left))
+
+
+def _cycle_rows(known: ScreenState, rows: int) -> list[Text]:
+    lines = [Text(f"{'n':>5}{'w':>2}{'time':>8}{'generated':>10}{'N s/m':>7}", style=_QUIET)]
+    for cycle in list(known.cycles)[: rows - 1]:
+        line = Text(f"{cycle.cycle:>5}{cycle.contact:>2}{si(cycle.duration_s, 's'):>8}")
+        line.append(f"{si(cycle.generated_j, 'J'):>10}", "yellow" if cycle.generated_j > 0.0 else "")
+        lines.append(line.append(f"{cycle.damping_n_s_per_m:>7.1f}"))
+    return (lines + [Text("")] * rows)[:rows]
+
+
+def _event_rows(known: ScreenState, rows: int) -> list[Text]:
+    lines = []
+    for event in list(known.events)[:rows]:
+        sign, style = (
+            ("✗", "bold red") if 200 <= event.code < 300 else ("⚠", "yellow") if event.code >= 300 else ("·", "")
+        )
+        clock = time.strftime("%H:%M:%S", time.localtime(event.timestamp))
+        lines.append(_quiet(f"{clock} ").append(f"{sign} {event.text}", style))
+    if not lines:
+        lines = [Text("none since this view was opened", style=_QUIET)]
+    return (lines + [Text("")] * rows)[:rows]
+
+
+def _footer(status: Status, endpoint: str, width: int) -> Text:
+    cells = (width if width < _NARROW else width // 2) - 4 - LABEL_WIDTH
+    right = _quiet(f"{2 * max(1, cells) * SLICE_S:.1f} s shown  ").append("q", "bold").append(" quit ", _QUIET)
+    left = _quiet(f" hapticd {status.version}  config {status.config_hash or '-'}  {endpoint}")
+    left.truncate(max(0, width - right.cell_len - 1), overflow="ellipsis")
+    return _spread(left, right, width)
+
+
+def _spread(left: Text, right: Text, width: int) -> Text:
+    """Both ends of a line; what does not fit is cut from the left part."""
+    room = max(0, width - right.cell_len)
+    left.truncate(room, overflow="ellipsis", pad=True)
+    return left.append_text(right)
+
+
+def _box(title: str, right: Text, rows: Sequence[Text], width: int) -> list[Text]:
+    """Rows in a frame of a given width, with a title at the left and something at the right of its upper edge."""
+    edge = _quiet("╭ ").append(title, "default").append(" ", _QUIET)
+    if right.cell_len:
+        right.truncate(max(0, width - edge.cell_len - 4), overflow="ellipsis")
+        right = Text(" ").append_text(right).append(" ")
+    edge.append("─" * (width - edge.cell_len - right.cell_len - 1), _QUIET).append_text(right).append("╮", _QUIET)
+    lines = [edge]
+    for row in rows:
+        row.truncate(width - 4, overflow="ellipsis", pad=True)
+        lines.append(_quiet("│ ").append_text(row).append(" │", _QUIET))
+    lines.append(_quiet("╰" + "─" * (width - 2) + "╯"))
+    return lines
+
+
+def _quiet(text: str) -> Text:
+    """The beginning of a line, dim; what is appended is not."""
+    return Text("").append(text, _QUIET)
+
+
+def _beside(left: Sequence[Text], right: Sequence[Text]) -> list[Text]:
+    return [Text("").append_text(one).append_text(other) for one, other in zip(left, right, strict=True)]

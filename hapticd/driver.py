@@ -1,0 +1,268 @@
+"""What a haptic device is: five states, checks in the public methods, hooks that a device fills in.
+
+    open -> (calibrate) -> enable -> read/write ... -> disable -> close
+
+Each step may be called twice; `disable` leaves the device without force whatever has happened. Public methods own
+order and checks, so that a driver only fills in the hooks whose names start with an underscore.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar, Generic, TypeVar
+
+from hapticd.device import MOST_METRICS, DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
+from hapticd.errors import DriverError, DriverStateError
+from hapticd.settings import Table
+
+
+class DriverOptions(Table):
+    """Base of every driver's options, the keys of [device.options]: strict, frozen, finite, no unknown keys."""
+
+
+OptionsT = TypeVar("OptionsT", bound=DriverOptions)
+
+
+class DriverState(enum.Enum):
+    """Where in its life a driver is."""
+
+    CLOSED = "closed"
+    OPEN = "open"
+    ENABLED = "enabled"
+
+
+_CLOSED, _ENABLED = DriverState.CLOSED, DriverState.ENABLED  # Python 3.11 takes 0.1 us to look a member up, each time
+
+
+class Driver(ABC, Generic[OptionsT]):
+    """A device behind a driver.
+
+    Args:
+        options: the device's options, an instance of `Options`.
+        period_s: time between ticks [s].
+
+    Attributes:
+        Options: the keys of [device.options].
+        METRICS: what it counts and measures.
+        ABSENT: what to do when `find` finds nothing, in a few words.
+        metrics: one number for each of `METRICS`, in their order; a driver writes them whenever it likes, from any of
+            its threads, which costs a tick no more than storing a number.
+    """
+
+    Options: ClassVar[type[DriverOptions]] = DriverOptions
+    METRICS: ClassVar[tuple[Metric, ...]] = ()
+    ABSENT: ClassVar[str] = "plug it in"
+
+    def __init__(self, options: OptionsT, period_s: float) -> None:
+        self.options = options
+        self.period_s = period_s
+        self.metrics = memoryview(bytearray(8 * MOST_METRICS)).cast("d")
+        self.state = DriverState.CLOSED
+        self._info: DeviceInfo | None = None
+        self._limit_squared = 0.0
+        self._axes = 0
+        self._calibrating = False
+        self._called_off = False
+
+    @classmethod
+    def check(cls, options: OptionsT, period_s: float) -> None:
+        """Refuse options that cannot run at this loop rate; most devices refuse nothing.
+
+        Args:
+            options: as the configuration gives them.
+            period_s: time between ticks [s].
+
+        Raises:
+            ValueError: a value goes too far; says `key = value: why`.
+        """
+
+    @classmethod
+    def find(cls, options: OptionsT | None = None) -> list[FoundDevice]:
+        """Every device of this kind that is there, whether it can be used or not; none is moved or kept open.
+
+        `hapticd devices` asks each driver in a process of its own, so that one that fails spoils no other.
+
+        Args:
+            options: what is needed to look for it; None: the defaults.
+        """
+        return []
+
+    @classmethod
+    def diagnose(cls, options: OptionsT | None = None) -> list[Diagnosis]:
+        """What this computer has and lacks of what the driver needs; opens no device.
+
+        `hapticd doctor` shows it, in a process of its own, and `hapticd devices` its problems where it finds nothing.
+
+        Args:
+            options: those of the configuration; None: the defaults.
+        """
+        return []
+
+    @property
+    def info(self) -> DeviceInfo:
+        """What the device declares.
+
+        Raises:
+            DriverStateError: the driver is not open.
+        """
+        if self._info is None:
+            raise DriverStateError("the device is not open")
+        return self._info
+
+    def place(self, wall_m: float, outward: int) -> None:
+        """Be told, before `open`, where the first wall stands on the device's single axis.
+
+        Only a simulated device cares: it starts relative to that wall.
+
+        Args:
+            wall_m: position of the wall's plane [m].
+            outward: +1 when the free side is the positive one, -1 otherwise.
+        """
+
+    def share_metrics(self, place: memoryview[float]) -> None:
+        """Keep the metrics in this memory from now on, where another process reads them."""
+        place[:] = self.metrics
+        self.metrics = place
+
+    def open(self) -> DeviceInfo:
+        """Find the device and learn what it is; no force, no motion.
+
+        Raises:
+            DriverError: not found, not permitted, busy, or it makes no sense.
+        """
+        if self.state is DriverState.CLOSED:
+            try:
+                self._info = self._open()
+            except BaseException:
+                self._close()
+                raise
+            # A simulated device saturates by itself; a hand is protected here, behind the guard.
+            limit_n = math.inf if self._info.simulated else self._info.max_force_n
+            self._limit_squared = (limit_n * (1.0 + 1e-9)) ** 2
+            self._axes = len(self._info.axes)
+            self.state = DriverState.OPEN
+        return self.info
+
+    def calibrate(self) -> None:
+        """Calibrate or home the device. The one call that may move an arm by itself.
+
+        Raises:
+            DriverStateError: not open, force is enabled, or it was called off.
+            DriverError: the device failed to calibrate.
+        """
+        if self.state is not DriverState.OPEN:
+            raise DriverStateError(f"calibrate: the device is {self.state.value}, it must be open without force")
+        self._called_off = False
+        self._calibrating = True
+        try:
+            self._calibrate()
+        except DriverError as error:
+            if self._called_off:
+                raise DriverStateError("the calibration was called off") from error
+            raise
+        finally:
+            self._calibrating = False
+
+    def call_off(self) -> None:
+        """Have a calibration that is under way, in another thread, end early; returns at once and never raises."""
+        if self._calibrating:
+            self._called_off = True
+            with contextlib.suppress(Exception):  # whoever calibrates is told
+                self._call_off()
+
+    def enable(self) -> None:
+        """Let the device take forces; the force is zero until the first write.
+
+        Raises:
+            DriverStateError: not open.
+            DriverError: the device refuses, for example while it is not calibrated.
+        """
+        if self.state is DriverState.CLOSED:
+            raise DriverStateError("enable: the device is not open")
+        if self.state is DriverState.OPEN:
+            self._enable()
+            self.state = DriverState.ENABLED
+
+    def read(self) -> Sample:
+        """The newest state of the device; never waits longer than a tick allows.
+
+        Raises:
+            DriverError: lost, late, or it makes no sense.
+        """
+        if self.state is _CLOSED:
+            raise DriverStateError("read: the device is not open")
+        return self._read()
+
+    def write(self, force_n: Sequence[float]) -> None:
+        """Apply a force until the next write.
+
+        Args:
+            force_n: force on the device along each axis [N].
+
+        Raises:
+            DriverStateError: not enabled, wrong number of axes, not finite, or beyond the device's limit.
+            DriverError: lost or late.
+        """
+        if self.state is not _ENABLED:
+            raise DriverStateError(f"write: the device is {self.state.value}, not enabled")
+        squared = 0.0
+        for newton in force_n:
+            squared += newton * newton
+        # A NaN fails every comparison, so it is refused here as well.
+        if not (squared <= self._limit_squared and squared < math.inf) or len(force_n) != self._axes:
+            raise DriverStateError(f"write: {list(force_n)} N is not a force within {self.info.max_force_n:g} N")
+        self._write(force_n)
+
+    def disable(self) -> None:
+        """Take the force away, from any state, after any error; never raises."""
+        if self.state is DriverState.CLOSED:
+            return
+        self.call_off()
+        self.state = DriverState.OPEN
+        with contextlib.suppress(Exception):  # whatever the device says now, the caller is already letting go
+            self._disable()
+
+    def close(self) -> None:
+        """Take the force away and give the device back; never raises."""
+        self.disable()
+        self.state = DriverState.CLOSED
+        self._info = None
+        with contextlib.suppress(Exception):
+            self._close()
+
+    @abstractmethod
+    def _open(self) -> DeviceInfo:
+        """Find the device, greet it, learn its axes and limits."""
+
+    def _calibrate(self) -> None:
+        """Calibrate or home; may move."""
+
+    def _call_off(self) -> None:
+        """Have `_calibrate` end with an error soon, the arm without force; called from another thread, may not wait.
+
+        Nothing to do for one that looks at `_called_off` between its own steps.
+        """
+
+    @abstractmethod
+    def _enable(self) -> None:
+        """Allow forces; the first force is zero."""
+
+    @abstractmethod
+    def _read(self) -> Sample:
+        """Return the newest state, the same object every time."""
+
+    @abstractmethod
+    def _write(self, force_n: Sequence[float]) -> None:
+        """Apply a force that is finite, within limits, one element an axis."""
+
+    @abstractmethod
+    def _disable(self) -> None:
+        """Take the force away; must work from any state, twice, after an error, and not raise."""
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Release what `_open` took, even half opened; must not raise."""

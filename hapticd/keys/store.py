@@ -1,0 +1,202 @@
+"""Where a computer's daemons keep their own key pair and the list of clients: a file each."""
+
+from __future__ import annotations
+
+import grp
+import os
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from hapticd.errors import ConfigError
+from hapticd.keys.file import Key, KeyWriteError, new_pair, read, write
+
+SYSTEM_KEYS = Path("/etc/hapticd/keys")
+"""The system service's own."""
+CLIENTS = "clients"
+"""Name of the directory of listed clients."""
+SECRET = ".key_secret"
+"""Ending of a file with a secret key."""
+
+_SERVER = f"server{SECRET}"
+_PUBLIC = ".key"
+_GROUP = "hapticd"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+
+
+@dataclass(frozen=True, slots=True)
+class KeyRing:
+    """What a running daemon needs to know.
+
+    Attributes:
+        pair: the daemon's own.
+        clients: listed keys by name.
+    """
+
+    pair: Key
+    clients: dict[str, Key]
+
+    def watchers(self) -> frozenset[str]:
+        """Public keys that may subscribe."""
+        return frozenset(key.public for key in self.clients.values())
+
+    def commanders(self) -> frozenset[str]:
+        """Public keys that may command."""
+        return frozenset(key.public for key in self.clients.values() if not key.watch_only)
+
+
+def key_directory() -> Path:
+    """Directory in which daemons of this user have their keys.
+
+    $HAPTICD_KEYS_DIR, else keys/ in systemd's $CONFIGURATION_DIRECTORY, else /etc/hapticd/keys for root, else
+    $XDG_CONFIG_HOME/hapticd/keys, which is ~/.config/hapticd/keys where that is not set.
+    """
+    given = os.environ.get("HAPTICD_KEYS_DIR")
+    if given:
+        return Path(given)
+    unit = os.environ.get("CONFIGURATION_DIRECTORY", "").split(":")[0]
+    if unit:
+        return Path(unit) / "keys"
+    if os.geteuid() == 0:
+        return SYSTEM_KEYS
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "hapticd" / "keys"
+
+
+class KeyDirectory:
+    """The keys of a computer's daemons.
+
+    Args:
+        path: where they lie; made when the first is written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def pair(self) -> Key | None:
+        """The daemon's own pair; None when none has been made.
+
+        Raises:
+            ConfigError: it cannot be used.
+        """
+        path = self.path / _SERVER
+        try:
+            path.stat()
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError:
+            raise self._closed(self.path) from None
+        key = self._read(path)
+        if not key.secret:
+            raise ConfigError(f"{path}: no secret-key in it; `hapticd keys make --force` makes a new pair")
+        return key
+
+    def clients(self) -> dict[str, Key]:
+        """Listed keys by name, in the order of names.
+
+        Raises:
+            ConfigError: one of them cannot be used, or two are the same.
+        """
+        clients: dict[str, Key] = {}
+        names: dict[str, Path] = {}
+        for path in self._listed():
+            key = self._read(path)
+            if key.public in names:
+                raise ConfigError(f"{path}: the same key as {names[key.public]}; remove one of them")
+            names[key.public] = path
+            clients[path.stem] = key
+        return clients
+
+    def make(self, force: bool = False) -> Key:
+        """Make the daemon's own pair.
+
+        Args:
+            force: also when there is one, which no client will find any more.
+
+        Raises:
+            KeyWriteError: it is there already, or cannot be written.
+        """
+        pair = new_pair()
+        self._write(self.path / _SERVER, pair, force)
+        return pair
+
+    def add(self, name: str, key: Key, force: bool = False) -> None:
+        """List a client; of its key only the public part is kept.
+
+        Args:
+            name: what to call it.
+            key: its key and what it may.
+            force: also when another one has that name.
+
+        Raises:
+            ConfigError: no such name can be, or the key is listed under another.
+            KeyWriteError: the name is taken, or it cannot be written.
+        """
+        path = self._client(name)
+        for other, listed in self.clients().items():
+            if other != name and listed.public == key.public:
+                raise ConfigError(f"{name}: that key is listed already: `hapticd keys add {other} --force` changes it")
+        self._write(path, replace(key, secret="", server=""), force)
+
+    def remove(self, name: str) -> None:
+        """Take a client from the list.
+
+        Raises:
+            ConfigError: there is none of that name.
+            KeyWriteError: it cannot be removed.
+        """
+        path = self._client(name)
+        try:
+            path.unlink()
+        except FileNotFoundError:
+            known = ", ".join(listed.stem for listed in self._listed()) or "none"
+            raise ConfigError(f"{name}: not listed; listed are: {known}") from None
+        except OSError as error:
+            raise _denied(path, error) from error
+
+    def _client(self, name: str) -> Path:
+        if _NAME.fullmatch(name) is None:
+            raise ConfigError(f"{name!r}: a client's name has letters, digits and _ . - only, at most 64")
+        return self.path / CLIENTS / f"{name}{_PUBLIC}"
+
+    def _listed(self) -> list[Path]:
+        try:
+            return sorted(path for path in (self.path / CLIENTS).iterdir() if path.suffix == _PUBLIC)
+        except (FileNotFoundError, NotADirectoryError):
+            return []
+        except OSError:
+            raise self._closed(self.path / CLIENTS) from None
+
+    def _read(self, path: Path) -> Key:
+        if path.exists() and not os.access(path, os.R_OK):
+            raise self._closed(path)
+        return read(path)
+
+    def _closed(self, path: Path) -> ConfigError:
+        """The service runs as a user of its own, to which root may have forgotten to give its keys."""
+        whole = f"sudo chgrp -R {_GROUP} {self.path} && sudo chmod -R g+rX {self.path}"
+        return ConfigError(f"{path}: this user may not read it; use sudo, or for the service: {whole}")
+
+    def _write(self, path: Path, key: Key, force: bool) -> None:
+        """Only its owner may change a key, and only the service's group may read it."""
+        group = _service_group()
+        try:
+            for directory in (self.path, self.path / CLIENTS):
+                if not directory.is_dir():
+                    directory.mkdir(mode=0o700, parents=True)
+                    os.chown(directory, -1, group)
+                    directory.chmod(0o700 if group < 0 else 0o750)
+        except OSError as error:
+            raise _denied(directory, error) from error
+        write(path, key, mode=0o600 if group < 0 else 0o640, group=group, replace=force)
+
+
+def _service_group() -> int:
+    """Group of the system service; -1 where there is none, and for everybody but root."""
+    try:
+        return grp.getgrnam(_GROUP).gr_gid if os.geteuid() == 0 else -1
+    except KeyError:
+        return -1
+
+
+def _denied(path: Path, error: OSError) -> KeyWriteError:
+    return KeyWriteError(f"{path}: {error.strerror}{'; try sudo' if isinstance(error, PermissionError) else ''}")

@@ -1,0 +1,177 @@
+"""What a stabilising law is: one scalar law per contact.
+
+A law is a module with
+
+    Params                          a `LawParams` model: the keys of [controller.params]
+    State                           a class whose annotations name scalar fields (float, int, bool)
+    start(state, params, snapshot)  activation from the measured state
+    step(state, params, tick)       -> force on the device along the wall's normal [N], contact force included
+
+`start` and `step` are arithmetic on floats: + - * /, comparisons, min, max, abs, sqrt. The same source runs
+interpreted in the loop and compiled in studies, with equal results to the last bit. `state` and `params` arrive as
+plain objects with the declared fields; a `Literal[...]` parameter arrives as the index of the chosen value, since
+compiled code knows no strings.
+
+A state that has the fields `damping_n_s_per_m` or `felt_mass_kg` has them published.
+
+Signs: x < 0 is inside the wall; a positive force pushes the device out.
+"""
+
+from __future__ import annotations
+
+import functools
+import typing
+from types import ModuleType
+from typing import Any, Literal
+
+from hapticd.errors import PluginError
+from hapticd.settings import Table
+
+Scalar = float | int | bool
+
+
+class LawParams(Table):
+    """Base of every law's parameters: strict, frozen, finite, no unknown keys."""
+
+
+class LawTick:
+    """What a law sees of one contact at one tick.
+
+    Every number is finite and within bounds that the tick keeps, so that a law need not look: |x| and |moved| below
+    1e8 m, |velocity| below 1e6 m/s, dt from 1e-9 to 1 s, forces below 1e18 N.
+
+    Attributes:
+        x_m: position relative to the wall [m], < 0 inside.
+        moved_m: x(n) - x(n-1) [m].
+        velocity_m_per_s: estimated velocity along the wall's normal [m/s].
+        dt_s: time since the last sample [s].
+        in_contact: whether x_m < 0.
+        contact_n: the contact's own force now, spring and wall damping [N].
+        spring_n: the spring's part of `contact_n` [N].
+        applied_n: force of this contact that was applied from the last sample to this one, F(n-1) [N].
+        applied_contact_n: the part of `applied_n` that was the contact's own, without the law's damping [N].
+        resolution_m: smallest step of the position that the device can report [m]; 0 when continuous.
+    """
+
+    __slots__ = (
+        "applied_contact_n",
+        "applied_n",
+        "contact_n",
+        "dt_s",
+        "in_contact",
+        "moved_m",
+        "resolution_m",
+        "spring_n",
+        "velocity_m_per_s",
+        "x_m",
+    )
+
+    def __init__(self, resolution_m: float = 0.0) -> None:
+        self.x_m = 0.0
+        self.moved_m = 0.0
+        self.velocity_m_per_s = 0.0
+        self.dt_s = 0.0
+        self.in_contact = False
+        self.contact_n = 0.0
+        self.spring_n = 0.0
+        self.applied_n = 0.0
+        self.applied_contact_n = 0.0
+        self.resolution_m = resolution_m
+
+
+class LawSnapshot:
+    """What a law is told when it takes over.
+
+    Attributes:
+        x_m: position relative to the wall [m], < 0 inside.
+        velocity_m_per_s: estimated velocity along the wall's normal [m/s].
+        applied_n: force applied by this contact in the last tick [N].
+        debt_j: energy that this contact has generated and nobody has dissipated yet [J], >= 0; a credit is not carried.
+        damping_n_s_per_m: damping that the law before had reached [N s/m]; 0 when unknown.
+    """
+
+    __slots__ = ("applied_n", "damping_n_s_per_m", "debt_j", "velocity_m_per_s", "x_m")
+
+    def __init__(
+        self,
+        x_m: float = 0.0,
+        velocity_m_per_s: float = 0.0,
+        applied_n: float = 0.0,
+        debt_j: float = 0.0,
+        damping_n_s_per_m: float = 0.0,
+    ) -> None:
+        self.x_m = x_m
+        self.velocity_m_per_s = velocity_m_per_s
+        self.applied_n = applied_n
+        self.debt_j = debt_j
+        self.damping_n_s_per_m = damping_n_s_per_m
+
+
+@functools.cache
+def state_fields(law: ModuleType) -> dict[str, type[Scalar]]:
+    """Names and types of the scalar fields of a law's state, in declaration order.
+
+    Raises:
+        PluginError: a field is not declared as float, int or bool.
+    """
+    fields: dict[str, type[Scalar]] = {}
+    try:
+        hints = typing.get_type_hints(law.State)
+    except Exception as error:
+        raise PluginError(f"law {law.__name__}: the annotations of State make no sense: {error}") from error
+    for name, kind in hints.items():
+        if kind not in (float, int, bool):
+            raise PluginError(f"law {law.__name__}: State.{name} must be float, int or bool, not {kind}")
+        fields[name] = kind
+    return fields
+
+
+def scalar_params(params: LawParams) -> dict[str, Scalar]:
+    """A law's parameters as plain scalars: a `Literal` value becomes its index, None becomes -1.
+
+    Raises:
+        PluginError: a parameter is neither a number, a bool nor a choice of literals.
+    """
+    scalars: dict[str, Scalar] = {}
+    for name, info in type(params).model_fields.items():
+        value = getattr(params, name)
+        choices = typing.get_args(info.annotation) if typing.get_origin(info.annotation) is Literal else ()
+        if choices:
+            scalars[name] = choices.index(value)
+        elif isinstance(value, bool | int | float):
+            scalars[name] = value
+        else:
+            raise PluginError(f"parameter {name} = {value!r}: a law takes numbers, bools and choices only")
+    return scalars
+
+
+@functools.cache
+def _plain_class(name: str, fields: tuple[str, ...]) -> type[Any]:
+    return type(name, (), {"__slots__": fields})
+
+
+def plain_object(name: str, fields: dict[str, Scalar]) -> Any:
+    """A slotted object with these fields: what a law reads and writes while it runs interpreted."""
+    plain = _plain_class(name, tuple(fields))()
+    for field, value in fields.items():
+        setattr(plain, field, value)
+    return plain
+
+
+def fresh_state(law: ModuleType) -> Any:
+    """A slotted state of a law with every field zero."""
+    return plain_object(f"{law.__name__}.State", {field: kind(0) for field, kind in state_fields(law).items()})
+
+
+def check_law(law: ModuleType) -> None:
+    """Say what a module lacks to be a law.
+
+    Raises:
+        PluginError: a part of the contract is missing or of the wrong kind.
+    """
+    for part in ("Params", "State", "start", "step"):
+        if not hasattr(law, part):
+            raise PluginError(f"law {law.__name__}: has no `{part}` (a law needs Params, State, start, step)")
+    if not (isinstance(law.Params, type) and issubclass(law.Params, LawParams)):
+        raise PluginError(f"law {law.__name__}: Params must derive from hapticd.law.LawParams")
+    state_fields(law)

@@ -1,0 +1,202 @@
+"""The memory that the control process and the supervisor share.
+
+    words | the driver's metrics | verdict | mailbox | events | tick records
+
+One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
+copied a slot: on x86 stores become visible in order, so what was not overwritten meanwhile is whole. Other machines
+do not promise that, and plain Python cannot ask them to, so they are refused.
+
+The memory is an anonymous file: it has no name, and it is gone when both processes are.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import platform
+from typing import Any
+
+import msgpack
+
+from hapticd.device import MOST_METRICS
+from hapticd.errors import HapticdError
+from hapticd.tick.event import LoopEvent
+from hapticd.tick.record import RecordLayout, TickRecord
+
+HISTORY_S = 8.0
+"""How much of the past the ring of records holds [s]."""
+
+RECORDS, CONTROL_BEAT, SUPERVISOR_BEAT, MAIL, MAIL_LENGTH, DONE, EVENTS, SKIPPED, DISARM, DISARMED = range(10)
+"""Words: records written, heartbeats [ns], letters sent, their length, letters answered, events, skipped deadlines, and
+how often disarming was asked for and done, which waits behind no letter."""
+
+_METRICS = 2048
+_VERDICT = 4096
+_MAILBOX = 8192
+_MAILBOX_SIZE = 1 << 18
+_EVENTS = _MAILBOX + _MAILBOX_SIZE
+_EVENT_SIZE = 1024
+_EVENT_SLOTS = 256
+_RECORDS = _EVENTS + _EVENT_SIZE * _EVENT_SLOTS
+
+
+class SharedMemory:
+    """The shared memory of one control process.
+
+    Args:
+        layout: how a record lies in memory.
+        rate_hz: ticks a second, which with `HISTORY_S` sets how many records are kept [Hz].
+        descriptor: an existing memory to map; None makes a new one.
+
+    Attributes:
+        view: all of it.
+        words: the 64-bit words at the start.
+        metrics: the driver's metrics; it writes each of them as a whole.
+        record_area: where the records lie.
+        descriptor: file descriptor to hand to the other process.
+
+    Raises:
+        HapticdError: this processor does not keep stores in order.
+    """
+
+    def __init__(self, layout: RecordLayout, rate_hz: float, descriptor: int | None = None) -> None:
+        if platform.machine() not in ("x86_64", "AMD64", "i686"):
+            raise HapticdError(f"hapticd needs an x86 processor: on {platform.machine()} the shared ring is not safe")
+        self.layout = layout
+        self.slots = int(HISTORY_S * rate_hz)
+        size = _RECORDS + self.slots * layout.size
+        if descriptor is None:
+            descriptor = os.memfd_create("hapticd")
+            os.ftruncate(descriptor, size)
+        self.descriptor = descriptor
+        self._map = mmap.mmap(descriptor, size)
+        self.view = memoryview(self._map)
+        self.words = self.view[:_METRICS].cast("q")
+        self.metrics = self.view[_METRICS : _METRICS + 8 * MOST_METRICS].cast("d")
+        self.record_area = self.view[_RECORDS:]
+
+    def close(self) -> None:
+        """Unmap the memory."""
+        self.words.release()
+        self.metrics.release()
+        self.record_area.release()
+        self.view.release()
+        self._map.close()
+        os.close(self.descriptor)
+
+    def write_event(self, event: LoopEvent) -> None:
+        """Append an event (control side); text that does not fit is cut."""
+        text = event.text.encode(errors="replace")[:600].decode(errors="ignore")
+        row: bytes = msgpack.packb([event.code, text, event.seq, event.deadline_ns, event.fields])
+        if len(row) > _EVENT_SIZE - 8:
+            row = msgpack.packb([event.code, text, event.seq, event.deadline_ns, {}])
+        start = _EVENTS + self.words[EVENTS] % _EVENT_SLOTS * _EVENT_SIZE
+        self.view[start : start + 8] = len(row).to_bytes(8, "little")
+        self.view[start + 8 : start + 8 + len(row)] = row
+        self.words[EVENTS] += 1
+
+    def post(self, letter: dict[str, Any]) -> int:
+        """Send a letter to the loop (supervisor side); returns its number.
+
+        Raises:
+            HapticdError: the one before is not answered yet, or it is too long.
+        """
+        if self.words[DONE] != self.words[MAIL]:
+            raise HapticdError("the control loop is still busy with the request before")
+        packed: bytes = msgpack.packb(letter)
+        if len(packed) > _MAILBOX_SIZE:
+            raise HapticdError(f"the request is {len(packed)} bytes long, {_MAILBOX_SIZE} fit")
+        self.view[_MAILBOX : _MAILBOX + len(packed)] = packed
+        self.words[MAIL_LENGTH] = len(packed)
+        self.words[MAIL] += 1
+        return self.words[MAIL]
+
+    def letter(self) -> dict[str, Any]:
+        """The letter that waits (control side)."""
+        unpacked: dict[str, Any] = msgpack.unpackb(self.view[_MAILBOX : _MAILBOX + self.words[MAIL_LENGTH]])
+        return unpacked
+
+    def answer(self, verdict: str) -> None:
+        """Answer it (control side): "" is done, anything else says why not."""
+        row = verdict.encode(errors="replace")[: _MAILBOX - _VERDICT - 8]
+        self.view[_VERDICT : _VERDICT + 8] = len(row).to_bytes(8, "little")
+        self.view[_VERDICT + 8 : _VERDICT + 8 + len(row)] = row
+        self.words[DONE] = self.words[MAIL]
+
+    def verdict(self) -> str:
+        """The answer to the last letter (supervisor side)."""
+        length = int.from_bytes(self.view[_VERDICT : _VERDICT + 8], "little")
+        return bytes(self.view[_VERDICT + 8 : _VERDICT + 8 + length]).decode(errors="replace")
+
+
+class RecordReader:
+    """Reads tick records from the ring; never in the writer's way.
+
+    Args:
+        shared: the memory.
+
+    Attributes:
+        dropped: records lost because the reader was too slow.
+    """
+
+    def __init__(self, shared: SharedMemory) -> None:
+        self._shared = shared
+        self._area = shared.record_area
+        self._next = 0
+        self.dropped = 0
+
+    def read(self, most: int = 4096) -> list[TickRecord]:
+        """The records that are new, oldest first, at most so many."""
+        layout = self._shared.layout
+        slots = self._shared.slots
+        words = self._shared.words
+        written = words[RECORDS]
+        if written - self._next > slots - 2:
+            keep = written - slots // 2  # leap well clear of the writer, or the next read is overtaken again
+            self.dropped += keep - self._next
+            self._next = keep
+        records = []
+        for number in range(self._next, min(written, self._next + most)):
+            start = number % slots * layout.size
+            row = bytes(self._area[start : start + layout.size])
+            self._next = number + 1
+            if words[RECORDS] - number > slots - 2:
+                self.dropped += 1
+            else:
+                records.append(layout.unpack(row))
+        return records
+
+
+class EventReader:
+    """Reads events from their ring; never in the writer's way.
+
+    Args:
+        shared: the memory.
+
+    Attributes:
+        dropped: events lost because the reader was too slow.
+    """
+
+    def __init__(self, shared: SharedMemory) -> None:
+        self._shared = shared
+        self._next = 0
+        self.dropped = 0
+
+    def read(self) -> list[LoopEvent]:
+        """The events that are new, oldest first."""
+        view = self._shared.view
+        words = self._shared.words
+        written = words[EVENTS]
+        oldest = max(self._next, written - _EVENT_SLOTS + 1)
+        self.dropped += oldest - self._next
+        events = []
+        for number in range(oldest, written):
+            start = _EVENTS + number % _EVENT_SLOTS * _EVENT_SIZE
+            row = bytes(view[start : start + _EVENT_SIZE])
+            if words[EVENTS] - number >= _EVENT_SLOTS:  # overwritten, or just being so
+                self.dropped += 1
+            else:
+                length = int.from_bytes(row[:8], "little")
+                events.append(LoopEvent(*msgpack.unpackb(row[8 : 8 + length])))
+        self._next = written
+        return events

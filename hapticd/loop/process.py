@@ -1,0 +1,170 @@
+"""The control process: what runs behind `python -m hapticd.loop.process`.
+
+The supervisor starts it with the configuration's text on its standard input and one end of a socket pair as its
+descriptor `--socket`. It answers with one packet: what it found and the descriptor of the shared memory, or why it
+cannot run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import gc
+import os
+import signal
+import socket
+import sys
+import time
+import traceback
+from dataclasses import asdict, replace
+from types import ModuleType
+
+import msgpack
+
+from hapticd import plugins
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.config.models import MAX_WALLS
+from hapticd.device import DeviceInfo, Sample
+from hapticd.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
+from hapticd.loop.loop import ControlLoop
+from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory
+from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
+from hapticd.loop.resume import ResumeState, identity
+from hapticd.tick.assemble import make_tick, place_device
+from hapticd.tick.record import RecordLayout
+from hapticd.tick.tick import ControlTick
+
+WARM_UP_TICKS = 200
+
+DEVICE_LOST = 3
+"""Exit code: the device is gone, and may come back."""
+
+LARGEST_ANSWER = 1 << 16
+_LONGEST_ERROR = 1 << 14
+
+
+def main() -> int:
+    """Run the control process; the exit code says how it went."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--socket", type=int, required=True)
+    parser.add_argument("--parent", type=int, required=True)
+    arguments = parser.parse_args()
+    # The terminal's interrupt goes to every process in the group; the supervisor alone decides what it means.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    channel = socket.socket(fileno=arguments.socket)
+    try:
+        control = _prepare(channel, arguments.parent)
+    except HapticdError as error:
+        with contextlib.suppress(ConnectionError):
+            channel.send(msgpack.packb({"error": str(error)[:_LONGEST_ERROR], "exit_code": error.exit_code}))
+        return error.exit_code
+    except ConnectionError:
+        return 1  # the supervisor is gone
+    try:
+        control.run()
+    except DriverError as error:  # the event says why
+        if error.__cause__ is not None:
+            traceback.print_exception(error.__cause__)
+        return DEVICE_LOST
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd and the supervisor both send one; it is over
+    return 0
+
+
+def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
+    request = msgpack.unpackb(sys.stdin.buffer.read())
+    config = parse(request["text"], request["name"])
+    before = ResumeState(**request["before"])
+    settings = config.config
+    config, accuracy = _fitted(config)
+    driver = config.driver(config.options, settings.loop.period_s)
+    place_device(config, driver)
+    info = driver.open()
+    try:
+        if before.device not in ("", identity(info)):
+            raise DeviceNotFoundError(f"found {identity(info)} instead of {before.device}: restart hapticd to use it")
+        _check_watchdog(config, info)
+        layout = RecordLayout(len(info.axes), info.has_orientation, MAX_WALLS)
+        shared = SharedMemory(layout, settings.loop.rate_hz)
+        tick = make_tick(config, info)
+        control = ControlLoop(
+            driver,
+            tick,
+            shared,
+            settings.loop,
+            settings.safety,
+            (info.simulated or settings.safety.auto_arm) and before.may_arm,
+            sleep_until,
+            before,
+        )
+        for name, law in _installed_laws().items():
+            control.requests.know(name, law)
+        control.requests.know(settings.controller.law, config.law)
+        _warm_up(make_tick(config, info))
+
+        def stop(_signal: int, _frame: object) -> None:
+            control.stop_requested = True
+
+        signal.signal(signal.SIGTERM, stop)
+        die_with_parent(parent_pid)
+        problems, advice = become_realtime(settings.loop)
+        shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
+        hello = {"info": asdict(info), "realtime": not problems, "warnings": problems + advice, "pid": os.getpid()}
+        hello["accuracy"] = accuracy
+        socket.send_fds(channel, [msgpack.packb(hello)], [shared.descriptor])
+        channel.close()
+    except BaseException:
+        driver.close()
+        raise
+    return control
+
+
+def _fitted(config: LoadedConfig) -> tuple[LoadedConfig, str]:
+    """The configuration with the device model that it asks for, and why that one."""
+    if getattr(config.options, "accuracy", None) is None:
+        return config, ""
+    from hapticd.offline.model_choice import fit  # only those who ask pay for it, and it needs `make_tick` from here
+
+    found = fit(config)
+    return (config, "") if found is None else (replace(config, options=found.options), found.reason)
+
+
+def _check_watchdog(config: LoadedConfig, info: DeviceInfo) -> None:
+    """Refuse a real device that would keep its force when this computer dies, unless the user has accepted that."""
+    if info.host_silence_ms is None and not info.simulated and not config.config.device.accept_no_watchdog:
+        raise ConfigError(
+            f"{config.path}: device.accept_no_watchdog = false: {info.model} keeps its last force when this computer "
+            "stops; read docs/safety.md, then set it to true"
+        )
+
+
+def _installed_laws() -> dict[str, ModuleType]:
+    """Every installed law that can be imported, so that a switch imports nothing."""
+    laws = {}
+    for name in plugins.names(plugins.CONTROLLERS):
+        try:
+            laws[name] = plugins.law(name)
+        except PluginError:
+            continue  # it is refused by name when somebody asks for it
+    return laws
+
+
+def _warm_up(tick: ControlTick) -> None:
+    """Run a copy of the tick on presses and releases of its walls, so that first calls are behind us."""
+    sample = Sample(len(tick.info.axes))
+    surface_m = [0.5 * (low + high) for low, high in tick.info.workspace_m]
+    for contact in tick.contacts:
+        surface_m[contact.wall.axis] = contact.wall.position_m
+    sample.position_m[:] = surface_m
+    tick.start(sample)
+    tick.arm()
+    for count in range(WARM_UP_TICKS):
+        depth_m = 1e-4 * (count % 20 - 10)
+        sample.time_ns = sample.sequence = count + 1
+        sample.position_m[:] = [at + depth_m for at in surface_m]
+        tick.step(sample, tick.period_s)
+    gc.collect()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

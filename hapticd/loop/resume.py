@@ -1,0 +1,39 @@
+"""What the control process before left behind, for the one that goes on with the device once it is found again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hapticd.device import DeviceInfo
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeState:
+    """Where the loop before stopped; of the first one, nothing.
+
+    Attributes:
+        seq: number of the next tick; subscribers see no step back.
+        skipped: deadlines skipped so far.
+        law: index of the law activation.
+        may_arm: forces were let through when it ended; a device that arms by itself may do so again.
+        latched: a fault that took the force away has not been cleared.
+        device: `identity` of the device; no other one may take its place. "": any.
+    """
+
+    seq: int = 0
+    skipped: int = 0
+    law: int = 0
+    may_arm: bool = True
+    latched: bool = False
+    device: str = ""
+
+
+FROM_START = ResumeState()
+"""What the first control process follows."""
+
+
+def identity(info: DeviceInfo) -> str:
+    """What tells a device from another, and what subscribers were told of it."""
+    extras = [f"{info.buttons} buttons"] if info.buttons else []
+    extras += [name for name in ("gripper", "orientation") if getattr(info, f"has_{name}")]
+    return " ".join([info.model, info.serial, f"({', '.join([''.join(info.axes), *extras])})"]).replace("  ", " ")

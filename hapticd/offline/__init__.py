@@ -1,0 +1,1 @@
+"""One run of a configuration without a daemon: the same tick on the simulated device."""

@@ -1,0 +1,183 @@
+"""Where things are: shipped files, and the sockets, lock and fault records of an instance."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from pathlib import Path
+from typing import Literal
+
+from hapticd.errors import ConfigError, InstanceError
+
+SYSTEM_CONFIG = Path("/etc/hapticd/hapticd.toml")
+
+_PACKAGE = Path(__file__).parent
+
+
+def directory(name: str) -> Path:
+    """A directory of shipped files, such as `config`."""
+    installed = _PACKAGE / "share" / name
+    return installed if installed.is_dir() else _PACKAGE.parent / name
+
+
+def default_config() -> Path:
+    """The configuration of a command that was given none: the machine's own, else the shipped example."""
+    try:
+        SYSTEM_CONFIG.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return directory("config") / "hapticd.toml"
+    except OSError:
+        pass  # it is there; reading it will say what is wrong with it
+    return SYSTEM_CONFIG
+
+
+DEFAULT_INSTANCE = "default"
+TELEMETRY = "telemetry"
+"""Name of the telemetry socket in the runtime directory."""
+CONTROL = "control"
+"""Name of the control socket beside it."""
+
+_RUN = Path("/run/hapticd")
+_INSTANCE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
+
+
+def runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
+    """Directory in which a daemon of this user keeps the sockets and the lock of an instance.
+
+    $HAPTICD_RUNTIME_DIR/<instance>, else systemd's $RUNTIME_DIRECTORY, else /run/hapticd/<instance> for root
+    or when this user may write there, else $XDG_RUNTIME_DIR/hapticd/<instance>, else
+    /tmp/hapticd-<uid>/<instance>.
+
+    Raises:
+        ConfigError: the name is none that a directory could have.
+    """
+    given = named_directory("RUNTIME", instance)
+    if given is not None:
+        return given
+    system = _RUN / instance
+    if os.geteuid() == 0 or os.access(system, os.W_OK | os.X_OK):
+        return system
+    return _user_runtime(instance)
+
+
+def make_runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
+    """The same, made when it is not there; below /tmp it is closed to other users.
+
+    Raises:
+        ConfigError: the name is none that a directory could have.
+        InstanceError: it cannot be made, or somebody else owns it.
+    """
+    directory = runtime_directory(instance)
+    shared = directory.is_relative_to(_temporary())
+    mode = 0o700 if shared else 0o755
+    try:
+        directory.parent.mkdir(mode=mode, parents=True, exist_ok=True)
+        if shared and not _ours(directory.parent):
+            raise InstanceError(
+                f"{directory.parent}: belongs to somebody else; set HAPTICD_RUNTIME_DIR to one of yours"
+            )
+        directory.mkdir(mode=mode, exist_ok=True)
+    except OSError as error:
+        raise InstanceError(
+            f"{directory}: cannot be made ({error.strerror}); set HAPTICD_RUNTIME_DIR to a directory of yours"
+        ) from error
+    return directory
+
+
+def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
+    """Where a client finds a socket of an instance: the system's daemon first, then the user's own.
+
+    When no daemon has made one yet: where this user's own daemon would make it.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+        InstanceError: the daemon's directory is not open to this user.
+    """
+    given = named_directory("RUNTIME", instance)
+    if given is not None:
+        return given / name
+    closed = None
+    for directory in (_RUN / instance, _user_runtime(instance)):
+        try:
+            if (directory / name).exists():
+                return directory / name
+        except PermissionError:
+            closed = directory
+    if closed is not None:
+        raise InstanceError(f"{closed}: not open to you: sudo usermod -aG hapticd $USER, then log in again")
+    return runtime_directory(instance) / name
+
+
+def telemetry_endpoint(instance: str = DEFAULT_INSTANCE) -> str:
+    """ZeroMQ endpoint on which an instance publishes to this computer."""
+    return f"ipc://{locate(TELEMETRY, instance)}"
+
+
+def named_directory(kind: Literal["RUNTIME", "STATE"], instance: str) -> Path | None:
+    """The directory of an instance that the environment names, if it does: $HAPTICD_<kind>_DIR, else systemd's.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
+    if _INSTANCE.fullmatch(instance) is None:
+        raise ConfigError(f"instance = {instance!r}: letters, digits and _ . - only, at most 32, the first no sign")
+    base = os.environ.get(f"HAPTICD_{kind}_DIR")
+    if base:
+        return Path(base) / instance
+    unit = os.environ.get(f"{kind}_DIRECTORY", "").split(":")[0]
+    if unit:
+        return Path(unit) if Path(unit).name == instance else Path(unit) / instance
+    return None
+
+
+def _user_runtime(instance: str) -> Path:
+    session = os.environ.get("XDG_RUNTIME_DIR")
+    if session:
+        return Path(session) / "hapticd" / instance
+    return _temporary() / instance
+
+
+def _temporary() -> Path:
+    return Path("/tmp") / f"hapticd-{os.geteuid()}"
+
+
+def _ours(directory: Path) -> bool:
+    status = directory.lstat()
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid()
+
+
+_STATE = Path("/var/lib/hapticd")
+_FAULTS = "faults"
+
+
+def fault_directory(instance: str) -> Path:
+    """Directory in which a daemon of this user keeps the fault records of an instance.
+
+    Below $HAPTICD_STATE_DIR/<instance>, else systemd's $STATE_DIRECTORY, else /var/lib/hapticd/<instance> for root,
+    else $XDG_STATE_HOME/hapticd/<instance>, which is ~/.local/state/hapticd/<instance> where that is not set.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
+    given = named_directory("STATE", instance)
+    if given is not None:
+        return given / _FAULTS
+    return (_STATE / instance if os.geteuid() == 0 else _user_state(instance)) / _FAULTS
+
+
+def fault_directories(instance: str) -> list[Path]:
+    """Where to look for the fault records of an instance: the system's daemon, and this user's own.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
+    given = named_directory("STATE", instance)
+    if given is not None:
+        return [given / _FAULTS]
+    return [_STATE / instance / _FAULTS, _user_state(instance) / _FAULTS]
+
+
+def _user_state(instance: str) -> Path:
+    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state"
+    return Path(home) / "hapticd" / instance

@@ -1,0 +1,1 @@
+"""What the computer is asked to keep: the installed service, its user, its units."""

@@ -1,0 +1,1 @@
+"""Law sources as machine code, equal to the last bit."""

@@ -1,0 +1,54 @@
+"""One daemon an instance: a lock that the kernel drops with the process, so that nothing stale can block a start."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+
+from hapticd.errors import InstanceError
+from hapticd.paths import make_runtime_directory
+
+
+class InstanceLock:
+    """Holds an instance until closed.
+
+    A second bind would silently take an ipc path over from a running daemon; this lock comes first.
+
+    Args:
+        instance: name of the instance.
+
+    Attributes:
+        directory: the instance's runtime directory.
+
+    Raises:
+        InstanceError: another daemon holds the instance, or the directory cannot be used.
+    """
+
+    def __init__(self, instance: str) -> None:
+        self.directory: Path = make_runtime_directory(instance)
+        path = self.directory / "lock"
+        try:
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise InstanceError(f"{path}: {error.strerror}; run as the user that owns the directory") from error
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = os.pread(self._descriptor, 32, 0).decode(errors="replace").strip()
+            os.close(self._descriptor)
+            raise InstanceError(
+                f"instance {instance!r} is already running (process {holder or 'unknown'}); stop it, or choose "
+                "another with --instance"
+            ) from error
+        if not path.exists() or path.stat().st_ino != os.fstat(self._descriptor).st_ino:
+            os.close(self._descriptor)
+            raise InstanceError(f"instance {instance!r} is just being stopped or started by another daemon; try again")
+        os.ftruncate(self._descriptor, 0)
+        os.pwrite(self._descriptor, f"{os.getpid()}\n".encode(), 0)
+        self._path = path
+
+    def close(self) -> None:
+        """Give the instance back and leave nothing behind."""
+        self._path.unlink(missing_ok=True)
+        os.close(self._descriptor)

@@ -1,0 +1,200 @@
+"""What the daemon says of itself: counts kept over its life, and the status that is made of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import hapticd
+from hapticd.errors import ConfigError
+from hapticd.supervisor.metrics import values_of
+from hapticd.telemetry.records import LateHistogram, Status
+from hapticd.telemetry.wire import timestamp_s
+from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.guard import limits
+from hapticd.tick.record import Flag, TickRecord
+from hapticd.tick.scene import WallTimes
+
+if TYPE_CHECKING:
+    from hapticd.config.loading import LoadedConfig
+    from hapticd.config.models import SafetyConfig
+    from hapticd.device import DeviceInfo
+    from hapticd.loop.resume import ResumeState
+    from hapticd.supervisor.child import LoopProcess
+    from hapticd.supervisor.recovery import Recovery
+
+_RATE_S = 0.5
+"""Shortest time that a measured rate is taken over [s]."""
+
+
+class StatusBuilder:
+    """Counts since the daemon started.
+
+    Args:
+        instance: name of the daemon's instance.
+        epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
+        file: the configuration, by its absolute path: the working directory may go while the daemon runs.
+
+    Attributes:
+        last: the newest tick, None before the first.
+        rate_hz: measured lately [Hz].
+        status: as it was made last.
+    """
+
+    def __init__(self, instance: str, epoch_offset_ns: int, file: Path) -> None:
+        self.last: TickRecord | None = None
+        self._flags = 0
+        self._law = 0
+        self.rate_hz = 0.0
+        self.status = Status()
+        self._instance = instance
+        self._offset_ns = epoch_offset_ns
+        self._file = file
+        self._late = LateHistogram()
+        self._busy_max_us = 0.0
+        self._ticks = 0
+        self._ticks_dropped = 0
+        self._events_dropped = 0
+        self._rate_from = (time.monotonic(), 0)
+        self._fault: LoopEvent | None = None
+        self._origin_m: dict[str, float] = {}
+        self._walls = WallTimes()
+
+    def add(self, records: Sequence[TickRecord]) -> None:
+        """Count ticks."""
+        for record in records:
+            self._late.add(record.late_us)
+            if record.busy_us > self._busy_max_us:
+                self._busy_max_us = record.busy_us
+        if records:
+            self._ticks += len(records)
+            self.last = records[-1]
+            self._flags = self.last.flags
+            self._law = self.last.law
+
+    def expect(self, before: ResumeState) -> None:
+        """A loop that has not ticked yet goes on from there; it does not know what the one before was tared to."""
+        self._origin_m = {}
+        self._walls.forget()
+        self._flags = Flag.LATCHED if before.latched else 0
+        self._law = before.law
+
+    def add_dropped(self, ticks: int, events: int) -> None:
+        """Count ticks and events that were overwritten before they were fetched."""
+        self._ticks_dropped += ticks
+        self._events_dropped += events
+
+    def add_event(self, event: LoopEvent) -> None:
+        """Remember the last fault, and where positions count from."""
+        if event.is_fault:
+            self._fault = event
+        elif event.code in (EventCode.TARED, EventCode.CALIBRATED):
+            self._origin_m = {name: float(value) for name, value in event.fields.items()}
+
+    @property
+    def tared(self) -> bool:
+        """Whether positions count from elsewhere than the device does."""
+        return any(self._origin_m.values())
+
+    def make(
+        self, config: LoadedConfig, control: LoopProcess, recovery: Recovery, fault_records: int, problem: str
+    ) -> Status:
+        """The status as it is now.
+
+        Args:
+            config: what is in force.
+            control: the loop.
+            recovery: knows whether there is a device.
+            fault_records: written so far.
+            problem: what stands and should be known, a line; "" when there is nothing.
+        """
+        self._measure_rate()
+        settings = config.config
+        info = control.info
+        if recovery.lost:
+            self.expect(recovery.before)
+        seq = self.last.seq if self.last else 0
+        self._walls.take(settings.scene.walls, seq)
+        flags = self._flags
+        self.status = Status(
+            version=hapticd.__version__,
+            instance=self._instance,
+            rate_hz=settings.loop.rate_hz,
+            measured_rate_hz=self.rate_hz,
+            ticks=self._ticks,
+            overruns=control.skipped,
+            late_histogram=tuple(self._late.counts),
+            late_max_us=self._late.max_us,
+            busy_max_us=self._busy_max_us,
+            ring_drops=self._ticks_dropped,
+            event_drops=self._events_dropped,
+            armed=bool(flags & Flag.ARMED),
+            fallback=bool(flags & Flag.FALLBACK),
+            releasing=bool(flags & Flag.RELEASING),
+            latched=bool(flags & Flag.LATCHED),
+            law=settings.controller.law,
+            law_index=self._law,
+            driver=settings.device.driver,
+            device=info.model,
+            serial=info.serial,
+            simulated=info.simulated,
+            calibrated=not flags & Flag.UNCALIBRATED,
+            device_metrics=values_of(config.driver.METRICS, control.shared.metrics),
+            accuracy=_accuracy(control.accuracy, control.fitted_hash, config.hash),
+            axes=info.axes,
+            origin_m=tuple(self._origin_m.get(f"origin_{axis}_m", 0.0) for axis in info.axes),
+            max_force_n=_largest_force_n(settings.safety, info),
+            wall_axis=tuple(wall.axis for wall in settings.scene.walls),
+            wall_position_m=tuple(wall.position_m for wall in settings.scene.walls),
+            wall_stiffness_n_per_m=self._walls.stiffness_n_per_m(seq, settings.loop.period_s),
+            config_file=str(self._file),
+            config_hash=config.hash,
+            realtime=control.realtime,
+            warnings=(
+                *((_missing(recovery),) if recovery.lost else ()),
+                *((problem,) if problem else ()),
+                *control.warnings,
+                *info.notes,
+            ),
+            device_lost_timestamp=self._epoch_s(recovery.lost_s) if recovery.lost else 0.0,
+            next_try_timestamp=self._epoch_s(recovery.next_try_s) if recovery.lost else 0.0,
+            fault_code=self._fault.code if self._fault else 0,
+            fault_text=self._fault.text if self._fault else "",
+            fault_timestamp=timestamp_s(self._fault.deadline_ns, self._offset_ns) if self._fault else 0.0,
+            fault_records=fault_records,
+        )
+        return self.status
+
+    def _measure_rate(self) -> None:
+        now_s = time.monotonic()
+        since_s, since_ticks = self._rate_from
+        if now_s - since_s >= _RATE_S:
+            self.rate_hz = (self._ticks - since_ticks) / (now_s - since_s)
+            self._rate_from = (now_s, self._ticks)
+
+    def _epoch_s(self, monotonic_s: float) -> float:
+        return timestamp_s(round(monotonic_s * 1e9), self._offset_ns)
+
+
+def _largest_force_n(safety: SafetyConfig, info: DeviceInfo) -> float:
+    """Largest magnitude that the guard lets through [N]; 0 when there is no limit."""
+    try:
+        max_force_n, max_axis_n, _ = limits(safety, info)
+    except ConfigError:  # taken over while the device was gone; it is refused when it is back
+        max_force_n = max_axis_n = info.max_force_n
+    limit_n = min(max_force_n, math.sqrt(len(info.axes)) * max_axis_n)
+    return limit_n if limit_n < math.inf else 0.0
+
+
+def _accuracy(reason: str, fitted_hash: str, hash_now: str) -> str:
+    if reason and fitted_hash != hash_now:
+        return f"{reason}; chosen for configuration {fitted_hash}, a restart chooses again"
+    return reason
+
+
+def _missing(recovery: Recovery) -> str:
+    in_s = recovery.next_try_s - time.monotonic()
+    return f"no device: {recovery.why}; {f'next try in {in_s:.0f} s' if in_s > 0.0 else 'trying now'}"

@@ -1,0 +1,336 @@
+"""What a daemon publishes, a class a topic: a key of the message is a field here."""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeAlias
+
+from hapticd.telemetry.wire import SCHEMA, Topic
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """One tick: where the device was and what pushed it, one element an axis.
+
+    Attributes:
+        timestamp: seconds since the epoch at the tick's deadline [s].
+        seq: tick number.
+        position_m: position [m].
+        velocity_m_per_s: estimated velocity [m/s].
+        force_n: force applied to the device [N].
+        force_requested_n: force asked for before the guard [N].
+        invalid: a value was not finite and stands here as 0.
+    """
+
+    topic: ClassVar[Topic] = Topic.POSITION
+
+    timestamp: float
+    seq: int
+    position_m: tuple[float, ...]
+    velocity_m_per_s: tuple[float, ...]
+    force_n: tuple[float, ...]
+    force_requested_n: tuple[float, ...]
+    invalid: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """One tick: the energy ledger of all contacts.
+
+    Attributes:
+        timestamp: seconds since the epoch at the tick's deadline [s].
+        seq: tick number.
+        energy_j: energy into the virtual environment, with the applied force [J].
+        spring_energy_j: stored in its springs [J].
+        dissipated_j: taken by wall damping and law [J].
+        generated_j: made by sampling and hold [J].
+        invalid: a value was not finite and stands here as 0.
+    """
+
+    topic: ClassVar[Topic] = Topic.ENERGY
+
+    timestamp: float
+    seq: int
+    energy_j: float
+    spring_energy_j: float
+    dissipated_j: float
+    generated_j: float
+    invalid: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Damping:
+    """One tick: what the law did, one element a wall.
+
+    Attributes:
+        timestamp: seconds since the epoch at the tick's deadline [s].
+        seq: tick number.
+        damping_n_s_per_m: damping of the law [N s/m].
+        in_contact: whether the device was inside the wall.
+        felt_mass_kg: mass that the law has identified [kg]; 0 while unknown.
+        invalid: a value was not finite and stands here as 0.
+    """
+
+    topic: ClassVar[Topic] = Topic.DAMPING
+
+    timestamp: float
+    seq: int
+    damping_n_s_per_m: tuple[float, ...]
+    in_contact: tuple[bool, ...]
+    felt_mass_kg: tuple[float, ...]
+    invalid: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """One tick: how punctual it was.
+
+    Attributes:
+        timestamp: seconds since the epoch at the tick's deadline [s].
+        seq: tick number.
+        deadline_ns: when it was due [ns of CLOCK_MONOTONIC].
+        late_us: how late it started [us].
+        busy_us: how long its body took [us].
+        dt_s: time since the tick before, on the device's clock where it has one [s].
+        invalid: a value was not finite and stands here as 0.
+    """
+
+    topic: ClassVar[Topic] = Topic.TIMING
+
+    timestamp: float
+    seq: int
+    deadline_ns: int
+    late_us: float
+    busy_us: float
+    dt_s: float
+    invalid: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """One completed cycle of energy exchange with a wall.
+
+    Attributes:
+        timestamp: seconds since the epoch at its end [s].
+        seq: tick number of its end.
+        contact: index of the wall.
+        cycle: number of the cycle at this wall.
+        energy_j: energy at its end [J].
+        generated_j: energy that it generated [J].
+        damping_n_s_per_m: damping of the law when it ended [N s/m].
+        duration_s: how long it took [s].
+        invalid: a value was not finite and stands here as 0.
+    """
+
+    topic: ClassVar[Topic] = Topic.CYCLE
+
+    timestamp: float
+    seq: int
+    contact: int
+    cycle: int
+    energy_j: float
+    generated_j: float
+    damping_n_s_per_m: float
+    duration_s: float
+    invalid: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """Buttons, gripper and wrist; what the device has not is None or empty.
+
+    Attributes:
+        timestamp: seconds since the epoch at the tick's deadline [s].
+        seq: tick number.
+        buttons: bit i is button i.
+        gripper_m: opening [m].
+        orientation: rotation matrix row by row.
+        invalid: a value was not finite and stands here as 0.
+    """
+
+    topic: ClassVar[Topic] = Topic.INPUT
+
+    timestamp: float
+    seq: int
+    buttons: int | None = None
+    gripper_m: float | None = None
+    orientation: tuple[float, ...] = ()
+    invalid: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something happened.
+
+    Attributes:
+        timestamp: seconds since the epoch at its tick [s].
+        seq: tick number.
+        code: `hapticd.tick.event.EventCode`; a newer daemon may know more of them.
+        text: one line for people.
+        fields: numbers and names that belong to it.
+    """
+
+    topic: ClassVar[Topic] = Topic.EVENT
+
+    timestamp: float
+    seq: int
+    code: int
+    text: str
+    fields: dict[str, float | int | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Ticks that did not arrive, told before the first record after them.
+
+    Attributes:
+        topic: of those ticks.
+        after: last tick before the gap.
+        seq: first tick after it.
+        missing: ticks in between; 0 when the daemon started anew and counts from the beginning.
+    """
+
+    topic: Topic
+    after: int
+    seq: int
+    missing: int
+
+
+LATE_EDGES_US = (10, 20, 40, 80, 160, 320, 640, 1280, 2560, 5120, 10240)
+"""Edges of the histogram of late ticks [us].
+
+Bin 0 counts ticks less than 10 us late, bin i those from edge i-1 to below edge i, the last one those of
+10.24 ms and more.
+"""
+
+
+class LateHistogram:
+    """Counts how late ticks were.
+
+    Attributes:
+        counts: one a bin, one more than there are edges.
+        max_us: the latest tick [us].
+    """
+
+    __slots__ = ("counts", "max_us")
+
+    def __init__(self) -> None:
+        self.counts = [0] * (len(LATE_EDGES_US) + 1)
+        self.max_us = 0.0
+
+    def add(self, late_us: float) -> None:
+        """Count one tick."""
+        self.counts[bisect.bisect_right(LATE_EDGES_US, late_us)] += 1
+        if late_us > self.max_us:
+            self.max_us = late_us
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Status:
+    """State of the daemon, once a second and at every change. Counts run since the daemon started.
+
+    Attributes:
+        timestamp: when it was said [s since the epoch]; the publisher fills it in.
+        seq: last tick published, -1 before the first; the publisher fills it in.
+        schema: version of the wire contract; the publisher fills it in.
+        every_ticks: one tick in so many is published; the publisher fills it in.
+        version: of hapticd.
+        instance: name of the daemon's instance.
+        rate_hz: ticks a second that the loop is set to [Hz].
+        measured_rate_hz: ticks a second that it ran lately [Hz]; 0 while unknown.
+        ticks: ticks that it ran.
+        overruns: deadlines that it skipped.
+        late_histogram: ticks by how late they were, bins of `LATE_EDGES_US`.
+        late_max_us: the latest of them [us].
+        busy_max_us: the longest tick body [us].
+        ring_drops: ticks that the supervisor was too slow to fetch.
+        event_drops: events that it was too slow to fetch.
+        armed: forces are let through.
+        fallback: the law failed, damping stands in for it.
+        releasing: the force is being ramped out.
+        latched: stopped by a fault until cleared.
+        law: name of the running law.
+        law_index: its activation, counted up at each switch.
+        driver: name of the driver.
+        device: what the device is.
+        serial: its serial number, "" without one.
+        simulated: no real device.
+        calibrated: the device knows where it is; until then its positions are nothing to rely on, and it takes no
+            force.
+        device_metrics: numbers that its driver keeps, such as frames lost, since it was opened.
+        accuracy: the model that a simulated device got for the accuracy asked for, and why; "" when none was asked for.
+        axes: names of its axes, in the order of positions and forces.
+        origin_m: where the device places the point that positions count from, an axis each [m]; 0 until tared.
+        max_force_n: largest force that the guard lets through [N]; 0 when there is no limit.
+        wall_axis: axis of each wall, in scene order.
+        wall_position_m: where each wall is on its axis [m].
+        wall_stiffness_n_per_m: its stiffness now, with the changes over time that the file names [N/m].
+        config_file: the file that is in force.
+        config_hash: of its content.
+        realtime: scheduling and memory are as the loop needs them.
+        warnings: what stands and should be known, a line each, for example "not real-time: ...".
+        device_lost_timestamp: since when the device is gone and looked for [s since the epoch]; 0 while it is there.
+        next_try_timestamp: when it is looked for again [s since the epoch]; 0 while it is there.
+        fault_code: of the last fault since the daemon started; 0 when there was none.
+        fault_text: what there was to say about it.
+        fault_timestamp: when it happened [s since the epoch]; 0 when there was none.
+        fault_records: fault records written since the daemon started.
+    """
+
+    topic: ClassVar[Topic] = Topic.STATUS
+
+    timestamp: float = 0.0
+    seq: int = -1
+    schema: int = SCHEMA
+    every_ticks: int = 1
+    version: str = ""
+    instance: str = ""
+    rate_hz: float = 0.0
+    measured_rate_hz: float = 0.0
+    ticks: int = 0
+    overruns: int = 0
+    late_histogram: tuple[int, ...] = ()
+    late_max_us: float = 0.0
+    busy_max_us: float = 0.0
+    ring_drops: int = 0
+    event_drops: int = 0
+    armed: bool = False
+    fallback: bool = False
+    releasing: bool = False
+    latched: bool = False
+    law: str = ""
+    law_index: int = 0
+    driver: str = ""
+    device: str = ""
+    serial: str = ""
+    simulated: bool = False
+    calibrated: bool = True
+    device_metrics: dict[str, float] = field(default_factory=dict)
+    accuracy: str = ""
+    axes: tuple[str, ...] = ()
+    origin_m: tuple[float, ...] = ()
+    max_force_n: float = 0.0
+    wall_axis: tuple[str, ...] = ()
+    wall_position_m: tuple[float, ...] = ()
+    wall_stiffness_n_per_m: tuple[float, ...] = ()
+    config_file: str = ""
+    config_hash: str = ""
+    realtime: bool = False
+    warnings: tuple[str, ...] = ()
+    device_lost_timestamp: float = 0.0
+    next_try_timestamp: float = 0.0
+    fault_code: int = 0
+    fault_text: str = ""
+    fault_timestamp: float = 0.0
+    fault_records: int = 0
+
+    def as_map(self) -> dict[str, Any]:
+        """Keys and values, for `Publisher.status`."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+
+Tick: TypeAlias = Position | Energy | Damping | Timing
+Sent: TypeAlias = Tick | Cycle | Input | Event | Status
+Record: TypeAlias = Sent | Gap

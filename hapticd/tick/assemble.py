@@ -1,0 +1,40 @@
+"""The tick that a configuration asks for, put together from its parts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hapticd.config.loading import LoadedConfig
+from hapticd.device import DeviceInfo
+from hapticd.errors import ConfigError
+from hapticd.tick.contact import RunningLaw
+from hapticd.tick.guard import Guard
+from hapticd.tick.tick import ControlTick
+
+
+def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
+    """The tick that a configuration asks for on a device.
+
+    Raises:
+        ConfigError: scene or limits do not fit the device.
+    """
+    settings = config.config
+    try:
+        return ControlTick(
+            settings.scene,
+            settings.velocity,
+            Guard(settings.safety, info),
+            info,
+            lambda: RunningLaw(config.law, config.params),
+            settings.loop.period_s,
+            settings.safety.ramp_s,
+        )
+    except ConfigError as error:
+        raise ConfigError(*(f"{config.path}: {problem}" for problem in error.problems)) from None
+
+
+def place_device(config: LoadedConfig, driver: Any) -> None:
+    """Tell a simulated device where the first wall is."""
+    walls = config.config.scene.walls
+    if walls:
+        driver.place(walls[0].position_m, 1 if walls[0].free_side == "positive" else -1)

@@ -1,0 +1,303 @@
+"""The last word on force: finite, within limits, ramped at every transition, latched after a fault.
+
+The guard reduces all contacts alike by one share, so that what they applied still sums to what was sent. Force limits
+hold always; ramps only at transitions, since a slew limit inside contact would itself be a controller.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from hapticd.config.models import SafetyConfig
+from hapticd.device import DeviceInfo
+from hapticd.errors import ConfigError
+
+DEFAULT_MAX_SPEED_M_PER_S = 2.0
+"""Over-speed stop of a real device, where the configuration names none [m/s]."""
+
+BLIND_RAMP_S = 0.01
+"""How long the last force is let out when the position is no longer known [s].
+
+Without a position there is no wall, only a constant push; at 12 N and 0.25 kg this bounds it to about 0.25 m/s.
+"""
+
+
+class BlendFields:
+    """The scalar fields that a blend of one contact's force keeps, `start_blend` to `blended`."""
+
+    blending: bool
+    blend_tick: float  # ticks done
+    blend_ticks: float  # ticks from the old force to the new one
+    blend_from_n: float  # the old force, held
+    blend_from_x_m: float  # where it was applied
+    blend_limit_n: float  # largest force of one contact
+
+
+def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: int) -> None:
+    """Begin a transition of one contact, from the force that is applied inside the wall.
+
+    Args:
+        state: an object with the fields of `BlendFields`.
+        from_n: force applied now, outward, within the limit [N].
+        x_m: where, relative to the wall, < 0 [m].
+        limit_n: largest force that one contact may come to [N].
+        ticks: how many it takes.
+    """
+    state.blending = True
+    state.blend_tick = 0.0
+    state.blend_ticks = float(ticks)
+    state.blend_from_n = from_n
+    state.blend_from_x_m = x_m
+    state.blend_limit_n = limit_n
+
+
+def blended(state: Any, x_m: float, force_n: float) -> float:
+    """The force of one tick of a transition [N]; call it once a tick while `state.blending` and in contact.
+
+        F = (1 - w) F_old min(1, x / x_old) + w F_new,     w = 0, 1/N, 2/N ... 1
+
+    The old force is held, and let out with the depth, so that nothing is left of it where contact ends. The new one
+    is taken up to the limit only: a wall that asks for ten times the limit must not come in ten times as fast. When
+    w is 1 that bound opens over N more ticks, which matters only where several walls share the limit.
+
+    From tick to tick F changes by at most 2 limit / N, and by what the motion changes of F_new and of x / x_old.
+
+    Args:
+        state: the fields of `BlendFields`.
+        x_m: position relative to the wall, < 0 [m].
+        force_n: the new force [N].
+    """
+    weight: float = state.blend_tick / state.blend_ticks
+    state.blend_tick += 1.0
+    reach_n: float = state.blend_limit_n
+    if weight >= 1.0:
+        if weight >= 2.0 or -reach_n <= force_n <= reach_n:
+            state.blending = False
+            return force_n
+        reach_n = reach_n / (2.0 - weight)
+    if force_n > reach_n:
+        force_n = reach_n
+    elif force_n < -reach_n:
+        force_n = -reach_n
+    if weight >= 1.0:
+        return force_n
+    old_n: float = state.blend_from_n
+    if x_m > state.blend_from_x_m:
+        old_n = old_n * (x_m / state.blend_from_x_m)
+    return (1.0 - weight) * old_n + weight * force_n
+
+
+class Mode(enum.IntEnum):
+    """What the guard lets through."""
+
+    DISARMED = 0
+    ARMED = 1
+    RELEASING = 2
+
+
+_DISARMED, _ARMED = Mode.DISARMED, Mode.ARMED  # Python 3.11 takes 0.1 us to look a member up, each time
+
+
+class Guard:
+    """Force limits and the armed, releasing and latched states.
+
+    Args:
+        safety: the [safety] table.
+        info: what the device declares.
+
+    Attributes:
+        mode: what is let through.
+        gain: how far a release has come, 1 armed to 0 disarmed.
+        latched: stopped by a fault until `clear`.
+        max_force_n, max_axis_n: force limits now, magnitude and along one axis [N]; `inf` in simulation.
+        limit_n: the smaller one, largest force of a single contact [N].
+        max_speed_m_per_s: over-speed stop [m/s]; `inf` in simulation.
+        limited: whether the last force was reduced by a limit.
+
+    Raises:
+        ConfigError: the simulation profile on a real device, or a limit above the device's own.
+    """
+
+    __slots__ = (
+        "_axis_goal_n",
+        "_axis_rate",
+        "_changing",
+        "_force_goal_n",
+        "_force_rate",
+        "_max_squared",
+        "_ramp_s",
+        "gain",
+        "latched",
+        "limit_n",
+        "limited",
+        "max_axis_n",
+        "max_force_n",
+        "max_speed_m_per_s",
+        "mode",
+    )
+
+    def __init__(self, safety: SafetyConfig, info: DeviceInfo) -> None:
+        self.latched = False
+        self._ramp_s = safety.ramp_s
+        self.max_force_n, self.max_axis_n, self.max_speed_m_per_s = limits(safety, info)
+        self._aim(self.max_force_n, self.max_axis_n, safety.ramp_s)
+        self.drop()
+
+    def configure(self, safety: SafetyConfig, info: DeviceInfo, force_n: Sequence[float] = ()) -> None:
+        """Take other limits; the force limits move there by a ramp.
+
+        Args:
+            safety: the [safety] table.
+            info: what the device declares.
+            force_n: what is applied now, one element an axis [N].
+
+        Raises:
+            ConfigError: the simulation profile on a real device, or a limit above the device's own.
+        """
+        goal_n, goal_axis_n, self.max_speed_m_per_s = limits(safety, info)
+        # Coming down, what nobody uses of a limit goes at once, and what is in use by the ramp. A limit counts before
+        # the gain of a release.
+        used_n = [newton / self.gain for newton in force_n] if self.gain > 0.0 else [0.0]
+        self.max_force_n = min(self.max_force_n, max(goal_n, math.hypot(*used_n)))
+        self.max_axis_n = min(self.max_axis_n, max(goal_axis_n, *map(abs, used_n), 0.0))
+        self._aim(goal_n, goal_axis_n, safety.ramp_s)
+
+    def arm(self) -> bool:
+        """Let forces through from now on; False while latched. The caller blends contacts in."""
+        if self.latched:
+            return False
+        self.mode = Mode.ARMED
+        self.gain = 1.0
+        self._changing = True
+        return True
+
+    def release(self, ramp_s: float, latch: bool = False) -> None:
+        """Ramp the force to zero and stay disarmed.
+
+        Args:
+            ramp_s: time from full force to none [s]; a release under way is only ever made faster.
+            latch: refuse to arm again until cleared.
+        """
+        self.latched = self.latched or latch
+        if self.mode is Mode.ARMED:
+            self.mode = Mode.RELEASING
+            self._ramp_s = ramp_s
+            self._changing = True
+        elif self.mode is Mode.RELEASING:
+            self._ramp_s = min(self._ramp_s, ramp_s)
+
+    def drop(self) -> None:
+        """Be disarmed at once, for a force that has already been let out."""
+        self.mode = Mode.DISARMED
+        self.gain = 0.0
+        self.limited = False
+        self._changing = True
+
+    def clear(self) -> None:
+        """Forget the fault; the device stays disarmed until armed."""
+        self.latched = False
+
+    def reduce(self, force_n: list[float], dt_s: float) -> float:
+        """Reduce a force, in place, to what is let through.
+
+        A force that is not a finite number becomes zero, and the guard stops and latches.
+
+        Args:
+            force_n: force asked for along each axis [N].
+            dt_s: time that a tick counts for in a ramp [s].
+
+        Returns:
+            The share that is left, 0 to 1, the same for every axis and contact.
+        """
+        if self._changing:
+            self._change(dt_s)
+        share = 1.0
+        squared = 0.0
+        max_axis_n = self.max_axis_n
+        for newton in force_n:
+            squared += newton * newton
+            if newton > max_axis_n or newton < -max_axis_n:
+                share = min(share, max_axis_n / abs(newton))
+        if not squared <= self._max_squared:  # true for NaN as well
+            if squared < math.inf:
+                share = min(share, self.max_force_n / math.sqrt(squared))
+            else:
+                self.latched = True
+                self.drop()
+        self.limited = share < 1.0
+        if self.mode is not _ARMED:
+            if self.mode is _DISARMED:
+                self.limited = False
+                for axis in range(len(force_n)):
+                    force_n[axis] = 0.0
+                return 0.0
+            share *= self.gain
+        if share != 1.0:
+            for axis in range(len(force_n)):
+                force_n[axis] *= share
+        return share
+
+    def _aim(self, goal_n: float, goal_axis_n: float, ramp_s: float) -> None:
+        self._force_goal_n = goal_n
+        self._axis_goal_n = goal_axis_n
+        self._force_rate = _rate(self.max_force_n, goal_n, ramp_s)
+        self._axis_rate = _rate(self.max_axis_n, goal_axis_n, ramp_s)
+        self._take_limits()
+        self._changing = True
+
+    def _take_limits(self) -> None:
+        self.limit_n = min(self.max_force_n, self.max_axis_n)
+        self._max_squared = min(self.max_force_n * self.max_force_n, sys.float_info.max)
+
+    def _change(self, dt_s: float) -> None:
+        """Move what is under way by one tick: force limits, a release."""
+        moving = False
+        if self.max_force_n != self._force_goal_n:
+            self.max_force_n = _towards(self.max_force_n, self._force_goal_n, self._force_rate * dt_s)
+            moving = True
+        if self.max_axis_n != self._axis_goal_n:
+            self.max_axis_n = _towards(self.max_axis_n, self._axis_goal_n, self._axis_rate * dt_s)
+            moving = True
+        if moving:
+            self._take_limits()
+        if self.mode is Mode.RELEASING:
+            self.gain -= dt_s / self._ramp_s if self._ramp_s > dt_s else 1.0
+            if self.gain <= 0.0:
+                self.drop()
+        self._changing = moving or self.mode is Mode.RELEASING
+
+
+def limits(safety: SafetyConfig, info: DeviceInfo) -> tuple[float, float, float]:
+    """Force limit, limit along one axis [N] and over-speed stop [m/s] of a configuration on a device.
+
+    Raises:
+        ConfigError: the simulation profile on a real device, or a limit above the device's own.
+    """
+    if safety.profile == "simulation":
+        if not info.simulated:
+            raise ConfigError(
+                f'safety.profile = "simulation": {info.model} is a real device; its force limits stay in force'
+            )
+        return math.inf, math.inf, math.inf
+    max_force_n = info.max_force_n if safety.max_force_n is None else safety.max_force_n
+    if not max_force_n <= info.max_force_n:
+        raise ConfigError(f"safety.max_force_n = {max_force_n:g}: {info.model} takes at most {info.max_force_n:g} N")
+    if not (max_force_n < math.inf or info.simulated):
+        raise ConfigError(f"safety.max_force_n: {info.model} is a real device and declares no limit; it needs one")
+    max_axis_n = max_force_n if safety.max_axis_force_n is None else safety.max_axis_force_n
+    max_speed_m_per_s = safety.max_speed_m_per_s
+    if max_speed_m_per_s is None:
+        max_speed_m_per_s = math.inf if info.simulated else DEFAULT_MAX_SPEED_M_PER_S
+    return max_force_n, max_axis_n, max_speed_m_per_s
+
+
+def _rate(now: float, goal: float, ramp_s: float) -> float:
+    return 0.0 if now == goal else abs(goal - now) / ramp_s
+
+
+def _towards(now: float, goal: float, step: float) -> float:
+    return min(goal, now + step) if goal > now else max(goal, now - step)

@@ -1,0 +1,153 @@
+"""Where the device is and how fast it moves, as far as its samples make sense."""
+
+from __future__ import annotations
+
+import math
+
+from hapticd.config.models import VelocityConfig
+from hapticd.device import DeviceInfo, Sample
+from hapticd.errors import ConfigError
+from hapticd.tick.velocity import Estimator, make_estimator
+
+LEAST_S = 1e-9
+MOST_S = 1.0
+"""Time between two samples [s]: less is standing still, and for longer the nominal period goes into the laws."""
+
+MOST_M = 1e7
+MOST_M_PER_S = 1e6
+"""No position and no velocity is beyond these, whatever a device declares [m], [m/s]."""
+
+MARGIN = 0.5
+"""How far outside its declared workspace, as a share of its size, a device may claim to be."""
+
+
+class Motion:
+    """Positions, velocities and time, from one sample to the next.
+
+    Args:
+        velocity: how velocity is estimated.
+        info: what the device declares.
+        period_s: nominal time between ticks [s].
+
+    Attributes:
+        position_m: counted from the origin, one element an axis, always the same list [m].
+        velocity_m_per_s: one element an axis, always the same list [m/s].
+        speed_squared: of the last sample that made sense, over all axes [m^2/s^2].
+        dt_s: time between the last two samples, as laws reckon with it [s].
+        origin_m: where the device places the point that positions count from, one element an axis [m].
+        repeated: how many samples in a row came with the device time or count of the one before.
+
+    Raises:
+        ConfigError: velocity is to come from a device that does not measure it.
+    """
+
+    __slots__ = (
+        "_axes",
+        "_bounds_m",
+        "_estimators",
+        "_has_clock",
+        "_has_sequence",
+        "_period_s",
+        "_sequence",
+        "_time_ns",
+        "_waited_s",
+        "dt_s",
+        "origin_m",
+        "position_m",
+        "repeated",
+        "speed_squared",
+        "velocity_m_per_s",
+    )
+
+    def __init__(self, velocity: VelocityConfig, info: DeviceInfo, period_s: float) -> None:
+        if velocity.estimator == "device" and not info.has_velocity:
+            raise ConfigError(f'velocity.estimator = "device": {info.model} does not measure its velocity')
+        axes = len(info.axes)
+        self.position_m = [0.0] * axes
+        self.velocity_m_per_s = [0.0] * axes
+        self.speed_squared = 0.0
+        self.dt_s = period_s
+        self.origin_m = [0.0] * axes
+        self.repeated = 0
+        self._axes = range(axes)
+        self._period_s = period_s
+        self._estimators: list[Estimator] = [make_estimator(velocity, info.resolution_m) for _ in range(axes)]
+        self._bounds_m = [
+            (max(low - MARGIN * (high - low), -MOST_M), min(high + MARGIN * (high - low), MOST_M))
+            for low, high in info.workspace_m
+        ]
+        self._has_clock = info.has_clock
+        self._has_sequence = info.has_sequence
+        self._time_ns = -1
+        self._sequence = -1
+        self._waited_s = 0.0
+
+    def start(self, sample: Sample) -> bool:
+        """Begin at a sample, at rest; False when it makes no sense, and nobody knows where the device is."""
+        self._time_ns = sample.time_ns
+        self._sequence = sample.sequence
+        # A NaN is nowhere.
+        if not all(low <= at <= high for at, (low, high) in zip(sample.position_m, self._bounds_m, strict=True)):
+            return False
+        for axis in self._axes:
+            self.position_m[axis] = position_m = sample.position_m[axis]
+            self._estimators[axis].start(position_m)
+        return True
+
+    def see(self, sample: Sample, clock_dt_s: float, at_rest: bool) -> bool:
+        """Take a sample in; False when it makes no sense.
+
+        Args:
+            sample: the newest state of the device.
+            clock_dt_s: time since the last tick on this computer's clock, for devices without one [s].
+            at_rest: forget what came before: the device stands where this sample says.
+        """
+        if self._has_clock:
+            dt_s = (sample.time_ns - self._time_ns) * 1e-9
+            repeats = dt_s <= 0.0
+            self._time_ns = sample.time_ns
+        else:
+            repeats = self._has_sequence and sample.sequence == self._sequence
+            self._sequence = sample.sequence
+            # The same sample once more: as on a device's own clock, time stands still until there is news.
+            self._waited_s += clock_dt_s
+            dt_s = 0.0 if repeats else self._waited_s
+            if not repeats:
+                self._waited_s = 0.0
+        if repeats:
+            self.repeated += 1
+        elif self.repeated:
+            self.repeated = 0
+        if LEAST_S <= dt_s < MOST_S:
+            self.dt_s = dt_s
+        else:
+            self.dt_s = self._period_s
+            if not MOST_S <= dt_s < math.inf:
+                dt_s = 0.0
+        speed_squared = 0.0
+        origin_m = self.origin_m
+        for axis in self._axes:
+            position_m = sample.position_m[axis]
+            low_m, high_m = self._bounds_m[axis]
+            if not low_m <= position_m <= high_m:  # false for NaN as well
+                return False
+            position_m -= origin_m[axis]
+            estimator = self._estimators[axis]
+            if at_rest:
+                estimator.start(position_m)
+            velocity_m_per_s = estimator.update(position_m, dt_s, sample.velocity_m_per_s[axis])
+            if not -MOST_M_PER_S < velocity_m_per_s < MOST_M_PER_S:
+                return False
+            self.position_m[axis] = position_m
+            self.velocity_m_per_s[axis] = velocity_m_per_s
+            speed_squared += velocity_m_per_s * velocity_m_per_s
+        self.speed_squared = speed_squared
+        return True
+
+    def move_origin(self, origin_m: list[float]) -> None:
+        """Count positions from another point, and stand there at rest [m]."""
+        for axis in self._axes:
+            self.position_m[axis] += self.origin_m[axis] - origin_m[axis]
+            self.velocity_m_per_s[axis] = 0.0
+            self._estimators[axis].start(self.position_m[axis])
+        self.origin_m = origin_m

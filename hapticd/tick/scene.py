@@ -1,0 +1,170 @@
+"""Virtual walls: a plane across one axis, a spring behind it, a damper that may be active.
+
+A wall is compiled from its configuration into the shortest evaluation that it needs: one without damping evaluates no
+damping, one without changes looks at no clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from hapticd.config.models import WallConfig
+from hapticd.config.timing import first_tick
+from hapticd.device import DeviceInfo
+from hapticd.errors import ConfigError
+
+
+class Wall:
+    """One wall, ready to be evaluated each tick.
+
+        F = -k x - b v   for x < 0, else 0         (the paper's eq. 5, with the wall's own damping)
+
+    Args:
+        config: the wall's table.
+        axis: index of its axis in the device's positions.
+        period_s: time between ticks, to count `at_s` in ticks [s].
+
+    Attributes:
+        axis: index of the axis.
+        outward: +1.0 when the free side is the positive one, else -1.0.
+        position_m: the plane on the axis [m].
+        stiffness_n_per_m, damping_n_s_per_m: in force now.
+        spring_n: the spring's part of the last force [N].
+        changes_left: whether a change is still to come; then `count_tick` must be called.
+    """
+
+    __slots__ = (
+        "_changes",
+        "_ticks",
+        "axis",
+        "changes_left",
+        "config",
+        "damping_n_s_per_m",
+        "outward",
+        "position_m",
+        "spring_n",
+        "stiffness_n_per_m",
+    )
+
+    def __init__(self, config: WallConfig, axis: int, period_s: float) -> None:
+        self.config = config
+        self.axis = axis
+        self.outward = 1.0 if config.free_side == "positive" else -1.0
+        self.position_m = config.position_m
+        self.stiffness_n_per_m = config.stiffness_n_per_m
+        self.damping_n_s_per_m = config.damping_n_s_per_m
+        self.spring_n = 0.0
+        self._ticks = 0
+        self._changes = [(first_tick(change.at_s, period_s), change) for change in config.changes]
+        self.changes_left = bool(self._changes)
+
+    def count_tick(self) -> None:
+        """Bring changes into force whose time has come."""
+        while self._changes and self._ticks >= self._changes[0][0]:
+            _, change = self._changes.pop(0)
+            if change.stiffness_n_per_m is not None:
+                self.stiffness_n_per_m = change.stiffness_n_per_m
+            if change.damping_n_s_per_m is not None:
+                self.damping_n_s_per_m = change.damping_n_s_per_m
+        self.changes_left = bool(self._changes)
+        self._ticks += 1
+
+    def force(self, x_m: float, velocity_m_per_s: float) -> float:
+        """Force on the device inside the wall, positive pushes out [N].
+
+        Args:
+            x_m: position relative to the wall, < 0 [m].
+            velocity_m_per_s: along the outward normal [m/s].
+        """
+        self.spring_n = spring_n = -self.stiffness_n_per_m * x_m
+        if self.damping_n_s_per_m == 0.0:
+            return spring_n
+        return spring_n - self.damping_n_s_per_m * velocity_m_per_s
+
+    def stored_j(self, x_m: float, limit_n: float) -> float:
+        """Energy in the spring [J]: k x^2 / 2, and force times depth where the guard's limit flattens it.
+
+        Args:
+            x_m: position relative to the wall [m].
+            limit_n: largest force that the guard lets through [N].
+        """
+        if x_m >= 0.0:
+            return 0.0
+        spring_n = -self.stiffness_n_per_m * x_m
+        if spring_n <= limit_n:
+            return -0.5 * spring_n * x_m
+        return limit_n * (-x_m - 0.5 * limit_n / self.stiffness_n_per_m)
+
+    def same_place(self, other: Wall) -> bool:
+        """Whether the two planes coincide, so that one may turn into the other under a hand."""
+        return (self.axis, self.outward, self.position_m) == (other.axis, other.outward, other.position_m)
+
+
+def compile_walls(walls: Iterable[WallConfig], info: DeviceInfo, period_s: float) -> list[Wall]:
+    """Walls on the axes of a device.
+
+    Raises:
+        ConfigError: a wall on an axis that the device has not, or on two axes of a device that has one.
+    """
+    compiled = []
+    placed = ""
+    for index, config in enumerate(walls):
+        if len(info.axes) == 1:
+            placed = placed or config.axis
+            if config.axis != placed:
+                raise ConfigError(
+                    f'scene.walls[{index}].axis = "{config.axis}": {info.model} has a single axis, and the first '
+                    f'wall has put it on "{placed}"'
+                )
+            axis = 0
+        elif config.axis in info.axes:
+            axis = info.axes.index(config.axis)
+        else:
+            raise ConfigError(
+                f'scene.walls[{index}].axis = "{config.axis}": {info.model} has only {", ".join(info.axes)}'
+            )
+        compiled.append(Wall(config, axis, period_s))
+    return compiled
+
+
+class WallTimes:
+    """Since which tick each wall stands, as the loop counts it, to within a turn of the supervisor."""
+
+    def __init__(self) -> None:
+        self._walls: list[tuple[WallConfig, int]] = []
+
+    def take(self, walls: Sequence[WallConfig], seq: int) -> None:
+        """These are the walls now; one that did not change keeps its clock.
+
+        Args:
+            walls: of the scene in force.
+            seq: the newest tick.
+        """
+        free = list(self._walls)
+        self._walls = []
+        for wall in walls:
+            known = next((stands for stands in free if stands[0] == wall), None)
+            if known is not None:
+                free.remove(known)
+            self._walls.append(known or (wall, seq))
+
+    def forget(self) -> None:
+        """The loop that knew them is gone."""
+        self._walls = []
+
+    def stiffness_n_per_m(self, seq: int, period_s: float) -> tuple[float, ...]:
+        """Stiffness of each wall at a tick [N/m].
+
+        Args:
+            seq: the tick.
+            period_s: time between ticks [s].
+        """
+        return tuple(_stiffness_n_per_m(wall, seq - since, period_s) for wall, since in self._walls)
+
+
+def _stiffness_n_per_m(wall: WallConfig, ticks: int, period_s: float) -> float:
+    stiffness_n_per_m = wall.stiffness_n_per_m
+    for change in wall.changes:
+        if ticks >= first_tick(change.at_s, period_s) and change.stiffness_n_per_m is not None:
+            stiffness_n_per_m = change.stiffness_n_per_m
+    return stiffness_n_per_m

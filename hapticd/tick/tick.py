@@ -1,0 +1,373 @@
+"""One tick, without clocks or devices: sample in, force out. The daemon and every offline run share it.
+
+positions -> velocities -> contacts -> laws -> guard -> force; then the books
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
+from hapticd.device import DeviceInfo, Sample
+from hapticd.tick import fallback
+from hapticd.tick.contact import Contact, RunningLaw, heirs
+from hapticd.tick.energy import EnergyLedger
+from hapticd.tick.event import EventCode
+from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, limits
+from hapticd.tick.motion import Motion
+from hapticd.tick.record import Flag
+from hapticd.tick.scene import Wall, compile_walls
+
+FROZEN_TICKS = 20
+"""Samples in a row with the same device time or count after which a device counts as frozen."""
+
+_IMPOSSIBLE = "the device reported a position that is not possible"
+_MODE_FLAGS = (0, int(Flag.ARMED), int(Flag.RELEASING))  # in the order of guard.Mode
+_LIMITED = int(Flag.LIMITED)
+_LATCHED = int(Flag.LATCHED)
+_FALLBACK = int(Flag.FALLBACK)
+
+
+class ControlTick:
+    """The state of the control loop between samples.
+
+    Args:
+        scene: the walls.
+        velocity: how velocity is estimated.
+        guard: force limits and arming.
+        info: what the device declares.
+        make_law: a fresh law, one a contact.
+        period_s: nominal time between ticks [s].
+        ramp_s: duration of every ramp [s].
+
+    Attributes:
+        motion: where the device is and how fast, as used by the last tick.
+        contacts: one a wall, in scene order.
+        leaving: walls that are gone and whose force still fades out.
+        past: books of the walls that are gone, so that the sums over all walls never jump.
+        force_n: force applied by the last tick, one element an axis [N].
+        requested_n: what the laws asked for [N].
+        fault: code of a fault raised by the last tick, 0 when there was none; the loop takes and clears it.
+        fault_text: what there is to say about it.
+
+    Raises:
+        ConfigError: the scene or the way to find the velocity does not fit the device.
+    """
+
+    def __init__(
+        self,
+        scene: SceneConfig,
+        velocity: VelocityConfig,
+        guard: Guard,
+        info: DeviceInfo,
+        make_law: Callable[[], RunningLaw],
+        period_s: float,
+        ramp_s: float,
+    ) -> None:
+        axes = len(info.axes)
+        self.info = info
+        self.motion = Motion(velocity, info, period_s)
+        self.guard = guard
+        self.period_s = period_s
+        self.ramp_s = ramp_s
+        self.make_law = make_law
+        self.contacts = [
+            Contact(wall, make_law(), info.resolution_m) for wall in compile_walls(scene.walls, info, period_s)
+        ]
+        self.leaving: list[Contact] = []
+        self.past = EnergyLedger()
+        self.force_n = [0.0] * axes
+        self.requested_n = [0.0] * axes
+        self.fallback = False
+        self.fault = 0
+        self.fault_text = ""
+        self._last_fault = 0
+        self._axes = range(axes)
+        self._active = self.contacts  # and those that leave
+        self._blind = True
+        self._excused = False
+        self._blind_gain = 0.0
+        self._blind_from_n = [0.0] * axes
+
+    @property
+    def ramp_ticks(self) -> int:
+        """Ticks that a ramp takes."""
+        return max(1, round(self.ramp_s / self.period_s))
+
+    @property
+    def flags(self) -> int:
+        """State bits of the tick record."""
+        guard = self.guard
+        flags = _MODE_FLAGS[guard.mode]
+        if guard.limited:
+            flags |= _LIMITED
+        if guard.latched:
+            flags |= _LATCHED
+        if self.fallback:
+            flags |= _FALLBACK
+        return flags
+
+    def start(self, sample: Sample) -> None:
+        """Begin at a sample, at rest and without force; one that makes no sense is a fault at the first step.
+
+        Raises:
+            PluginError: the law cannot start.
+        """
+        self._blind = not self.motion.start(sample)
+        self._excused = not sample.calibrated
+        if self._blind and sample.calibrated:
+            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
+        for contact in self.contacts:
+            contact.start(self.motion.position_m[contact.wall.axis])
+            contact.law.start(contact.snapshot(0.0))
+
+    def arm(self) -> bool:
+        """Let forces through; a wall that is already pressed comes in by a ramp. False while latched.
+
+        Raises:
+            PluginError: the law cannot start; nothing has changed then.
+        """
+        if self.guard.mode is Mode.ARMED:
+            return True
+        if self.guard.latched:
+            return False
+        laws = self._started(self.contacts, self.make_law)
+        self.guard.arm()
+        self.fallback = False
+        self._take_laws(laws)
+        for contact in self._active:
+            self._blend(contact)
+        return True
+
+    def tare(self) -> bool:
+        """Count positions from here on. False while forces are let through or nobody knows where the device is."""
+        if self._blind or self.guard.mode is not Mode.DISARMED:
+            return False
+        motion = self.motion
+        self._move_origin([origin + at for origin, at in zip(motion.origin_m, motion.position_m, strict=True)])
+        return True
+
+    def forget_origin(self) -> None:
+        """Count positions as the device does, for one that is disarmed."""
+        self._move_origin([0.0 for _ in self._axes])
+
+    def switch(
+        self,
+        scene: SceneConfig | None = None,
+        safety: SafetyConfig | None = None,
+        make_law: Callable[[], RunningLaw] | None = None,
+    ) -> None:
+        """Take another scene, other limits, another law: all or nothing, and without a step in force.
+
+        A wall that did not change keeps its clock, law and books; one that changed in place keeps law and books; one
+        that is gone fades out. Another law is put on every wall, but not in the place of the fallback.
+
+        Raises:
+            ConfigError: the scene or the limits do not fit the device; nothing has changed then.
+            PluginError: the law cannot start; nothing has changed then.
+        """
+        if safety is not None:
+            limits(safety, self.info)
+        contacts = self.contacts
+        changed: list[tuple[Contact, Wall]] = []
+        if scene is not None:
+            contacts, changed = self._arrange(compile_walls(scene.walls, self.info, self.period_s))
+        new = [contact for contact in contacts if contact not in self.contacts]
+        make = self.make_law if make_law is None else make_law
+        asked = self._started(new if make_law is None else contacts, make)
+        # From here on nothing can fail.
+        self.make_law = make
+        if safety is not None:
+            self.guard.configure(safety, self.info, self.force_n)
+            self.ramp_s = safety.ramp_s
+        for contact in self.contacts:
+            if contact not in contacts:
+                self._let_go(contact)
+        for contact, wall in changed:
+            contact.wall = wall
+            self._blend(contact)
+        self.contacts = contacts
+        self._active = contacts + self.leaving
+        if self.fallback:
+            asked = self._started(new, self._fallback_law)
+        self._take_laws(asked)
+        for contact, _ in asked:
+            self._blend(contact)
+
+    def release(self, ramp_s: float | None = None) -> None:
+        """Ramp the force to zero and stay disarmed."""
+        self.guard.release(self.ramp_s if ramp_s is None else ramp_s)
+
+    def fail(self, code: EventCode, text: str) -> None:
+        """Stop because of a fault: ramp the force to zero and latch. The same fault is told once until cleared."""
+        if not self.fault and not (self.guard.latched and code == self._last_fault):
+            self.fault = self._last_fault = code
+            self.fault_text = text
+        self.guard.release(self.ramp_s, latch=True)
+
+    def fail_law(self, code: EventCode, text: str) -> None:
+        """Put the damping fallback in the place of every law, and stop."""
+        if not self.fallback:
+            self.fallback = True
+            self._take_laws(self._started(self.contacts, self._fallback_law))
+            for contact in self.contacts:
+                self._blend(contact)
+        self.fail(code, text)
+
+    def step(self, sample: Sample, clock_dt_s: float) -> list[float]:
+        """One tick.
+
+        Args:
+            sample: the newest state of the device.
+            clock_dt_s: time since the last tick on this computer's clock, for devices without one [s].
+
+        Returns:
+            The force to write, one element an axis [N]; the same list every time.
+        """
+        motion = self.motion
+        guard = self.guard
+        seen = motion.see(sample, clock_dt_s, self._blind)
+        if guard.mode is Mode.ARMED:
+            limit = guard.max_speed_m_per_s
+            if motion.repeated >= FROZEN_TICKS:
+                self.fail(EventCode.DEVICE_FROZEN, f"the device repeated the same sample {FROZEN_TICKS} times")
+            elif seen and motion.speed_squared > limit * limit:
+                speed = math.sqrt(motion.speed_squared)
+                self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
+        if not seen or self._blind:
+            if not seen or self._blind_gain > 0.0:
+                return self._step_blind(sample.calibrated)
+            self._see_again()
+        position_m = motion.position_m
+        velocity_m_per_s = motion.velocity_m_per_s
+        requested_n = self.requested_n
+        force_n = self.force_n
+        dt_s = motion.dt_s
+        contacts = self._active
+        for axis in self._axes:
+            requested_n[axis] = force_n[axis] = 0.0
+        for contact in contacts:
+            axis = contact.wall.axis
+            contact.observe(position_m[axis], velocity_m_per_s[axis], dt_s)
+        try:
+            for contact in contacts:
+                contact.act()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
+            self._replace_laws(contact, error)
+        for contact in contacts:
+            wall = contact.wall
+            axis = wall.axis
+            outward = wall.outward
+            force_n[axis] += outward * contact.force_n
+            requested_n[axis] += outward * contact.requested_n
+        share = guard.reduce(force_n, self.period_s)
+        gain = guard.gain
+        limit_n = guard.limit_n
+        for contact in contacts:
+            contact.settle(share, gain, limit_n, dt_s)
+        if self.leaving:
+            self._drop_gone()
+        return force_n
+
+    def _move_origin(self, origin_m: list[float]) -> None:
+        self.motion.move_origin(origin_m)
+        for contact in self._active:
+            contact.start(self.motion.position_m[contact.wall.axis])
+
+    def _fallback_law(self) -> RunningLaw:
+        params = fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m)
+        return RunningLaw(fallback, params)
+
+    def _replace_laws(self, contact: Contact, error: BaseException) -> None:
+        """A law raised or returned nonsense: all are replaced, and asked again."""
+        try:
+            text = f"{type(error).__name__}: {error}"
+        except Exception:  # noqa: BLE001 - an exception of anybody's making need not even be printable
+            text = type(error).__name__
+        self.fail_law(EventCode.LAW_FAILED, f"law {contact.law.module.__name__}: {text}")
+        for each in self._active:
+            each.act()
+
+    def _step_blind(self, calibrated: bool) -> list[float]:
+        """Let the last force out quickly: without a position there is no wall.
+
+        That a device which is not calibrated does not know where it is is no fault: it has no force.
+        """
+        force_n = self.force_n
+        guard = self.guard
+        if guard.mode is Mode.ARMED or (calibrated and (self._excused or not self._blind)):
+            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
+        self._excused = not calibrated
+        if not self._blind:
+            self._blind = True
+            self._blind_gain = 1.0
+            self._blind_from_n = list(force_n)
+        self._blind_gain -= self.period_s / BLIND_RAMP_S
+        if self._blind_gain <= 1e-9:
+            self._blind_gain = 0.0
+            guard.drop()
+        for axis in self._axes:
+            force_n[axis] = self._blind_gain * self._blind_from_n[axis]
+            self.requested_n[axis] = 0.0
+        return force_n
+
+    def _see_again(self) -> None:
+        """Positions make sense again: stand there, at rest and without force; if armed meanwhile, come in by a ramp."""
+        self._blind = False
+        for contact in self._active:
+            contact.start(self.motion.position_m[contact.wall.axis])
+            self._blend(contact)
+
+    def _started(
+        self, contacts: Iterable[Contact], make_law: Callable[[], RunningLaw]
+    ) -> list[tuple[Contact, RunningLaw]]:
+        """A law for each contact, started where the contact is now; nothing has changed yet."""
+        velocity_m_per_s = self.motion.velocity_m_per_s
+        laws = []
+        for contact in contacts:
+            law = make_law()
+            law.start(contact.snapshot(velocity_m_per_s[contact.wall.axis]))
+            laws.append((contact, law))
+        return laws
+
+    def _take_laws(self, laws: Iterable[tuple[Contact, RunningLaw]]) -> None:
+        motion = self.motion
+        for contact, law in laws:
+            contact.take_law(law, motion.velocity_m_per_s[contact.wall.axis], motion.dt_s)
+
+    def _blend(self, contact: Contact) -> None:
+        contact.blend(self.ramp_ticks, self.guard.gain, self.guard.limit_n)
+
+    def _arrange(self, walls: list[Wall]) -> tuple[list[Contact], list[tuple[Contact, Wall]]]:
+        """Contacts for these walls, old ones where they fit, and which of those have to take their new wall."""
+        contacts = []
+        changed = []
+        for wall, heir in zip(walls, heirs(walls, self.contacts), strict=True):
+            contact = heir or Contact(wall, self._fallback_law(), self.info.resolution_m)
+            if heir is None:
+                contact.start(self.motion.position_m[wall.axis])
+            elif heir.wall.config != wall.config:
+                changed.append((heir, wall))
+            contacts.append(contact)
+        return contacts, changed
+
+    def _let_go(self, contact: Contact) -> None:
+        """A wall that is gone: from now on it asks for nothing, and a blend takes its force there."""
+        nothing = {"stiffness_n_per_m": 0.0, "damping_n_s_per_m": 0.0, "changes": ()}
+        contact.wall = Wall(contact.wall.config.model_copy(update=nothing), contact.wall.axis, self.period_s)
+        law = RunningLaw(fallback, fallback.Params(damping_n_s_per_m=0.0))
+        self._take_laws([(contact, law)])
+        self._blend(contact)
+        self.leaving.append(contact)
+
+    def _drop_gone(self) -> None:
+        """Close the books of walls whose force has faded out."""
+        gone = [contact for contact in self.leaving if not contact.blending and contact.applied_n == 0.0]
+        if gone:
+            for contact in gone:
+                self.past.absorb(contact.ledger)
+            self.leaving = [contact for contact in self.leaving if contact not in gone]
+            self._active = self.contacts + self.leaving

@@ -1,0 +1,1 @@
+"""The commands `hapticd study ...`, thin modules over the studies."""

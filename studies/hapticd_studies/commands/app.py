@@ -1,0 +1,35 @@
+"""`hapticd study`: the studies, each imported only when it is wanted, since they need the extra `study`."""
+
+from __future__ import annotations
+
+from hapticd.cli.group import lazy_group
+
+_COMMANDS = "hapticd_studies.commands"
+
+app = lazy_group(
+    {
+        "paper": (
+            f"{_COMMANDS}.paper:command",
+            "Run every simulation and experiment of the paper, and say what reproduces.",
+        ),
+        "zwidth": (
+            f"{_COMMANDS}.zwidth:command",
+            "Map where laws keep a pressed wall stable, over any two parameters.",
+        ),
+        "robustness": (
+            f"{_COMMANDS}.robustness:command",
+            "Press random devices into random walls under every law, and count which settle.",
+        ),
+        "accuracy": (
+            f"{_COMMANDS}.accuracy:command",
+            "Measure what every shortcut costs in accuracy, and what every bit of accuracy costs in time.",
+        ),
+        "scene": (f"{_COMMANDS}.scene:command", "Find the smallest model that keeps every answer of a scene."),
+        "extremes": (
+            f"{_COMMANDS}.extremes:command",
+            "Hold the model's arithmetic against exact answers, over many decades of every parameter.",
+        ),
+    },
+    help="Put laws to the test offline, over many runs. Needs: pip install 'hapticd[study]'",
+    epilog="Example: hapticd study paper --output paper",
+)

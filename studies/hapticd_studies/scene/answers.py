@@ -1,0 +1,71 @@
+"""What a model without some terms answers otherwise than the full one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hapticd.offline.run import Played
+
+_LEAST_SETTLING_S = 0.002
+"""Settling times closer than this are the same whatever the tolerance: a tick or two of a threshold [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """A run held against the one of the full model; shares are of the full model's.
+
+    Attributes:
+        verdict: what became of it.
+        same_verdict: whether that is what became of the full model.
+        settled_s: when it settled; NaN when it never did or has nowhere to [s].
+        settling: how much earlier or later, a share; 0 where neither settles, infinite where only one does.
+        force: root mean square of the difference in force, tick by tick, a share.
+        energy: largest difference of the energy into the walls, a share of the largest.
+        stiffness: difference of the stiffness shown at the end, a share.
+    """
+
+    verdict: str
+    same_verdict: bool
+    settled_s: float
+    settling: float
+    force: float
+    energy: float
+    stiffness: float
+
+    def broken(self, tolerance: float) -> list[str]:
+        """The answers that are not the full model's within a share."""
+        found = [] if self.same_verdict else ["verdict"]
+        for name in ("settling", "force", "energy", "stiffness"):
+            if not getattr(self, name) <= tolerance:
+                found.append(name)
+        return found
+
+
+def answers(run: Played, full: Played) -> Answers:
+    """Hold a run against that of the full model."""
+    largest_j = max(map(abs, full.energy_j))
+    energy_j = run.energy_error_j(full)
+    return Answers(
+        verdict=run.verdict,
+        same_verdict=run.verdict == full.verdict,
+        settled_s=run.settled_s,
+        settling=_settling(run.settled_s, full.settled_s),
+        force=run.force_error(full),
+        energy=energy_j / largest_j if largest_j > 0.0 else (0.0 if energy_j == 0.0 else math.inf),
+        stiffness=_share(run.displayed_n_per_m, full.displayed_n_per_m),
+    )
+
+
+def _settling(one_s: float, full_s: float) -> float:
+    if not math.isnan(one_s) and not math.isnan(full_s) and abs(one_s - full_s) <= _LEAST_SETTLING_S:
+        return 0.0
+    return _share(one_s, full_s)
+
+
+def _share(one: float, full: float) -> float:
+    if math.isnan(one) or math.isnan(full):
+        return 0.0 if math.isnan(one) and math.isnan(full) else math.inf
+    if one == full:
+        return 0.0
+    return abs(one - full) / abs(full) if full != 0.0 else math.inf

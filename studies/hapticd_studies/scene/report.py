@@ -1,0 +1,139 @@
+"""What a scene needs, as a table, JSON and a configuration ready to save."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+
+from rich.table import Table
+
+import hapticd
+from hapticd.offline.verdict import Criterion
+from hapticd_studies.grid.output import as_json
+from hapticd_studies.scene.answers import Answers
+from hapticd_studies.scene.study import Scene
+from hapticd_studies.scene.ticks import TickCount
+
+_MOST = 10.0
+"""Changes beyond this share are all the same to a reader."""
+
+
+def table(scene: Scene) -> Table:
+    """Each term by itself, then all that can go together."""
+    shown = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    shown.add_column("without", no_wrap=True)
+    for head in ("saves", "settles", "force", "energy", "stiffness"):
+        shown.add_column(head, justify="right", no_wrap=True)
+    shown.add_column("needed", overflow="fold")
+    full = scene.full
+    shown.add_row(
+        "nothing",
+        f"of {scene.operations:.0f}",
+        _seconds(full.settled_s),
+        f"{full.peak_n:.3g} N",
+        f"{max(map(abs, full.energy_j)):.2g} J",
+        _number(full.displayed_n_per_m),
+        full.verdict,
+    )
+    for one in scene.removals:
+        if one.answers is None:
+            shown.add_row(one.term.name, "", "", "", "", "", "yes: there is no such configuration")
+            continue
+        now = {"verdict": f"verdict ({one.answers.verdict})"}
+        needed = "no"
+        if one.broken:
+            alone = "not with the others gone; alone" if one.term in scene.left_out else "yes"
+            needed = f"{alone}: {', '.join(now.get(name, name) for name in one.broken)}"
+        elif one.term not in scene.left_out:
+            needed = "once others are gone"
+        shown.add_row(one.term.name, f"{one.saved:.0f}", *_cells(one.answers), needed)
+    saved = scene.operations - scene.minimal_operations
+    name = f"all {len(scene.left_out)} that can go"
+    shown.add_row(name, f"{saved:.0f}", *_cells(scene.minimal_answers), scene.minimal_answers.verdict, style="bold")
+    return shown
+
+
+def sentences(scene: Scene, ticks: Sequence[TickCount]) -> Iterator[str]:
+    """What it comes to, a line each."""
+    gone = ", ".join(term.name for term in scene.left_out)
+    yield (
+        f"Within {100.0 * scene.tolerance:g} % this scene needs {len(scene.removals) - len(scene.left_out)} of its "
+        f"{len(scene.removals)} terms" + (f"; it does without {gone}." if gone else ".")
+    )
+    if not scene.proven:
+        yield "Too many terms to try all combinations: no further one can go, but others together might be more."
+    named = {one.name: one.operations for one in ticks}
+    yield (
+        f"A tick takes {scene.minimal_operations:.0f} instead of {scene.operations:.0f} instructions; an empty loop "
+        f"{named['empty loop']}, each plain wall {named['two walls'] - named['one wall']} more."
+    )
+
+
+def minimal_text(scene: Scene) -> str:
+    """The smallest model as a file: the configuration as it was, comments included, without what it does not need."""
+    gone = ", ".join(term.name for term in scene.left_out) or "nothing"
+    return (
+        f"# {scene.loaded.path} without what its scene does not need within {100.0 * scene.tolerance:g} %: {gone}.\n"
+        f"{scene.minimal.text.lstrip()}"
+    )
+
+
+def json(scene: Scene, ticks: Sequence[TickCount], duration_s: float) -> bytes:
+    """Everything, for programs."""
+    return as_json(
+        {
+            "study": "scene",
+            "hapticd": hapticd.__version__,
+            "config": str(scene.loaded.path),
+            "duration_s": duration_s,
+            "tolerance": scene.tolerance,
+            "criterion": Criterion().declared(),
+            "full": {
+                "verdict": scene.full.verdict,
+                "settled_s": scene.full.settled_s,
+                "peak_force_n": scene.full.peak_n,
+                "displayed_stiffness_n_per_m": scene.full.displayed_n_per_m,
+                "operations": scene.operations,
+            },
+            "terms": [
+                {
+                    "name": one.term.name,
+                    "saved_operations": one.saved,
+                    "answers": asdict(one.answers) if one.answers else None,
+                    "broken": list(one.broken),
+                }
+                for one in scene.removals
+            ],
+            "minimal": {
+                "without": [term.name for term in scene.left_out],
+                "answers": asdict(scene.minimal_answers),
+                "operations": scene.minimal_operations,
+                "proven": scene.proven,
+                "config": minimal_text(scene),
+            },
+            "tried": scene.tried,
+            "ticks": [asdict(one) for one in ticks],
+        }
+    )
+
+
+def _cells(found: Answers) -> list[str]:
+    return [
+        _seconds(found.settled_s),
+        _percent(found.force),
+        _percent(found.energy),
+        _percent(found.stiffness),
+    ]
+
+
+def _seconds(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.3f} s"
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.0f} N/m"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %" if share < _MOST else f"> {100.0 * _MOST:.0f} %"

@@ -1,0 +1,154 @@
+"""Where a daemon's keys lie, and who may read and change them."""
+
+from __future__ import annotations
+
+import os
+import stat
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from hapticd.errors import ConfigError
+from hapticd.keys import store
+from hapticd.keys.file import Key, KeyWriteError, new_pair
+from hapticd.keys.store import KeyDirectory, KeyRing, key_directory
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> KeyDirectory:
+    return KeyDirectory(tmp_path / "hapticd" / "keys")
+
+
+def modes(root: Path) -> dict[str, int]:
+    return {str(path.relative_to(root)): stat.S_IMODE(path.stat().st_mode) for path in (root, *root.rglob("*"))}
+
+
+def test_the_environment_comes_first_then_the_unit_then_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HAPTICD_KEYS_DIR", "CONFIGURATION_DIRECTORY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", "/home/lab")
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    assert key_directory() == Path("/home/lab/.config/hapticd/keys")
+    monkeypatch.setenv("XDG_CONFIG_HOME", "/c")
+    assert key_directory() == Path("/c/hapticd/keys")
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert key_directory() == Path("/etc/hapticd/keys")
+    monkeypatch.setenv("CONFIGURATION_DIRECTORY", "/etc/hapticd:/etc/other")
+    assert key_directory() == Path("/etc/hapticd/keys")
+    monkeypatch.setenv("HAPTICD_KEYS_DIR", "/k")
+    assert key_directory() == Path("/k")
+
+
+def test_only_the_user_reads_the_keys_of_a_daemon_of_ones_own(
+    keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "_service_group", lambda: -1)
+    keys.make()
+    keys.add("laptop", new_pair())
+    assert modes(keys.path) == {".": 0o700, "server.key_secret": 0o600, "clients": 0o700, "clients/laptop.key": 0o600}
+
+
+def test_the_services_group_reads_its_keys_and_nobody_else(keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    group = next(iter({*os.getgroups(), os.getgid()}))
+    monkeypatch.setattr(store, "_service_group", lambda: group)
+    keys.make()
+    keys.add("laptop", new_pair())
+    assert modes(keys.path) == {".": 0o750, "server.key_secret": 0o640, "clients": 0o750, "clients/laptop.key": 0o640}
+    assert {path.stat().st_gid for path in (keys.path, *keys.path.rglob("*"))} == {group}
+
+
+def test_the_services_group_is_for_root_to_give(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("grp.getgrnam", lambda name: SimpleNamespace(gr_gid=77 if name == "hapticd" else 0))
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert store._service_group() == 77
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    assert store._service_group() == -1
+
+
+def test_a_ring_says_who_may_watch_and_who_may_command(keys: KeyDirectory) -> None:
+    laptop, wall = new_pair(), new_pair()
+    keys.add("laptop", laptop)
+    keys.add("wall", replace(wall, watch_only=True))
+    assert keys.clients() == {"laptop": Key(laptop.public), "wall": Key(wall.public, watch_only=True)}
+    ring = KeyRing(new_pair(), keys.clients())
+    assert ring.watchers() == {laptop.public, wall.public}
+    assert ring.commanders() == {laptop.public}
+    assert laptop.secret not in (keys.path / "clients" / "laptop.key").read_text()
+
+
+def test_nothing_is_replaced_unless_that_is_asked_for(keys: KeyDirectory) -> None:
+    pair, laptop = keys.make(), new_pair()
+    keys.add("laptop", laptop)
+    with pytest.raises(KeyWriteError, match="is there already"):
+        keys.make()
+    with pytest.raises(KeyWriteError, match="is there already"):
+        keys.add("laptop", new_pair())
+    assert (keys.pair(), keys.clients()) == (pair, {"laptop": Key(laptop.public)})
+    assert keys.make(force=True) != pair
+    keys.add("laptop", Key(laptop.public, watch_only=True), force=True)
+    assert keys.clients() == {"laptop": Key(laptop.public, watch_only=True)}
+
+
+def test_a_client_is_removed_by_its_name(keys: KeyDirectory) -> None:
+    keys.add("laptop", new_pair())
+    with pytest.raises(ConfigError, match="labtop: not listed; listed are: laptop"):
+        keys.remove("labtop")
+    keys.remove("laptop")
+    assert keys.clients() == {}
+    with pytest.raises(ConfigError, match="laptop: not listed; listed are: none"):
+        keys.remove("laptop")
+
+
+def test_a_key_has_one_name_since_it_can_have_one_right_only(keys: KeyDirectory) -> None:
+    laptop = new_pair()
+    keys.add("laptop", laptop)
+    with pytest.raises(ConfigError, match="other: that key is listed already: `hapticd keys add laptop --force`"):
+        keys.add("other", laptop)
+    copy = keys.path / "clients" / "copy.key"
+    copy.write_text((keys.path / "clients" / "laptop.key").read_text())
+    with pytest.raises(ConfigError, match=f"laptop.key: the same key as {copy}"):
+        keys.clients()
+
+
+@pytest.mark.parametrize("name", ["", "..", "../server", "a/b", ".hidden", "a b", "x" * 65, "é"])
+def test_a_name_that_is_no_file_is_refused(keys: KeyDirectory, name: str) -> None:
+    with pytest.raises(ConfigError, match="a client's name has letters"):
+        keys.add(name, new_pair())
+    with pytest.raises(ConfigError, match="a client's name has letters"):
+        keys.remove(name)
+    assert not keys.path.exists()
+
+
+def test_a_file_that_is_no_key_is_named_and_lets_nobody_in(keys: KeyDirectory) -> None:
+    keys.make()
+    broken = keys.path / "clients" / "broken.key"
+    broken.write_text("nonsense")
+    with pytest.raises(ConfigError, match=f"{broken}: no public-key in it"):
+        keys.clients()
+    (keys.path / "server.key_secret").write_text((keys.path / "server.key_secret").read_text().split("    secret")[0])
+    with pytest.raises(ConfigError, match=r"server\.key_secret: no secret-key in it"):
+        keys.pair()
+
+
+def test_what_a_writer_left_unfinished_is_no_client(keys: KeyDirectory) -> None:
+    keys.add("laptop", new_pair())
+    (keys.path / "clients" / ".wall.key.x8f3").write_text("half")
+    assert list(keys.clients()) == ["laptop"]
+
+
+def test_keys_that_the_services_user_may_not_read_are_named_with_a_remedy(
+    keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keys.make()
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(ConfigError, match=f"server.key_secret: .*sudo chgrp -R hapticd {keys.path}"):
+        keys.pair()
+
+
+def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(KeyWriteError, match=f"{tmp_path}/file/keys: Not a directory"):
+        KeyDirectory(tmp_path / "file" / "keys").make()

@@ -1,0 +1,149 @@
+"""What the loop is asked for between ticks: a switch in slices, a tare, and nothing left behind of either."""
+
+from __future__ import annotations
+
+import gc
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.device import Sample
+from hapticd.supervisor.reload import switch_letter
+from hapticd.tick.event import EventCode
+from tests.loop.bench import PERIOD_S, Bench
+
+WALLS = "[[scene.walls]]\nstiffness_n_per_m = 12000.0\n"
+DEVICE = "[device.options]\ninitial_position_m = 0.02\n"
+START = parse(DEVICE + WALLS, "start")
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench(START)
+    yield made
+    made.close()
+
+
+def configured(text: str) -> LoadedConfig:
+    return parse(DEVICE + text, "lab.toml")
+
+
+def test_tare_takes_the_present_position_as_the_origin_of_positions_and_walls(bench: Bench) -> None:
+    bench.ticks(5)
+    here_m = bench.tick.motion.position_m[0]
+    assert here_m == pytest.approx(0.02)
+    assert bench.ask(do="tare") == ""
+    assert bench.told()[EventCode.TARED].fields == {"origin_x_m": here_m}
+    bench.ticks(1)
+    assert bench.tick.motion.position_m == [0.0]
+    assert bench.tick.motion.velocity_m_per_s == [0.0], "nothing has moved"
+    assert bench.tick.contacts[0].x_m == 0.0, "the wall stands where the device is"
+
+
+def test_a_tare_on_a_tare_counts_from_the_device_as_well(bench: Bench) -> None:
+    bench.ticks(1)
+    bench.ask(do="tare")
+    assert bench.ask(do="tare") == ""
+    assert bench.tick.motion.origin_m == pytest.approx([0.02])
+
+
+@pytest.mark.parametrize("mode", ["armed", "releasing", "blind"])
+def test_tare_is_refused_with_a_force_or_without_a_position_and_moves_nothing(
+    bench: Bench, mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.ticks(1)
+    assert bench.ask(do="arm") == ""
+    if mode != "armed":
+        assert bench.ask(do="disarm") == ""
+    if mode == "blind":
+        bench.ticks(100)
+        nowhere = Sample(1)
+        nowhere.position_m[0] = math.nan
+        monkeypatch.setattr(bench.driver, "read", lambda: nowhere)
+    assert "hapticd disarm" in bench.ask(do="tare")
+    assert bench.tick.motion.origin_m == [0.0]
+
+
+def test_a_tared_scene_is_kept_through_a_switch_and_felt_where_it_is(bench: Bench) -> None:
+    bench.ticks(1)
+    bench.ask(do="tare")
+    wanted = configured(WALLS.replace("12000.0", "9000.0"))
+    assert bench.ask(**switch_letter(START, wanted)) == ""
+    assert bench.tick.motion.origin_m == pytest.approx([0.02])
+    assert bench.ask(do="arm") == ""
+    bench.ticks(1)
+    sample = bench.driver.read()
+    sample.position_m[0] = 0.02 - 1e-3  # a millimetre in from where it was tared
+    sample.time_ns += 1_000_000
+    assert bench.tick.step(sample, PERIOD_S) == pytest.approx([9.0])
+
+
+def test_a_calibration_forgets_the_origin_since_the_device_may_count_from_elsewhere_now(bench: Bench) -> None:
+    bench.ticks(1)
+    bench.ask(do="tare")
+    assert bench.ask(do="calibrate") == ""
+    assert bench.tick.motion.origin_m == [0.0]
+    bench.ticks(1)
+    assert bench.tick.motion.position_m == pytest.approx([0.02])
+
+
+def test_a_switch_that_is_refused_leaves_law_scene_and_limits_as_they_were(bench: Bench) -> None:
+    bench.ticks(1)
+    letter = switch_letter(START, configured("[controller]\nlaw = 'tdpa'\n[safety]\nramp_s = 0.2\n"))
+    letter["safety"]["max_force_n"] = 50.0
+    before = (bench.tick.contacts[0].law, bench.tick.contacts[0].wall, bench.tick.ramp_s, bench.loop.law_count)
+    assert "takes at most 12 N" in bench.ask(**letter)
+    assert (bench.tick.contacts[0].law, bench.tick.contacts[0].wall, bench.tick.ramp_s, bench.loop.law_count) == before
+    assert EventCode.SWITCHED not in bench.told()
+
+
+def test_what_means_the_same_goes_on_with_what_the_law_has_learnt(bench: Bench) -> None:
+    """A default that is now written out is no other law."""
+    law = bench.tick.contacts[0].law
+    assert bench.ask(**switch_letter(START, configured(WALLS + "[controller.params]\nwindow = 2\n"))) == ""
+    assert bench.tick.contacts[0].law is law
+    assert bench.ask(**switch_letter(START, configured(WALLS + "[controller.params]\nwindow = 3\n"))) == ""
+    assert bench.tick.contacts[0].law is not law
+
+
+def test_each_wall_has_a_law_of_its_own(bench: Bench) -> None:
+    wanted = configured(WALLS + WALLS.replace("12000.0", "1000.0") + "[controller]\nlaw = 'tdpa'\n")
+    assert bench.ask(**switch_letter(START, wanted)) == ""
+    one, two = (contact.law for contact in bench.tick.contacts)
+    assert one.module is two.module
+    assert one.state is not two.state
+    assert one.params is not two.params
+
+
+def test_nothing_that_is_asked_leaves_a_cycle_for_the_collector_which_is_off_in_the_loop(bench: Bench) -> None:
+    good = [
+        switch_letter(START, configured(f"{walls}[controller]\nlaw = '{law}'\n"))
+        for law in ("none", "tdpa", "energy-cycle")
+        for walls in ("", WALLS, WALLS + WALLS.replace("12000.0", "1000.0\nposition_m = 0.1"))
+    ]
+    letters: list[dict[str, Any]] = [
+        *good,
+        {**good[0], "scene": {"walls": [{"axis": "z"}]}},
+        {**good[0], "params": {"window": "x"}},
+        {**good[0], "safety": {"max_force_n": 50.0}},
+        {"do": "switch"},
+        {"do": "what"},
+        *({"do": do} for do in ("tare", "arm", "tare", "calibrate", "disarm", "clear")),
+    ]
+    bench.ticks(1)
+    for letter in letters:  # what is made once is made now
+        bench.ask(**letter)
+    found = []
+    gc.disable()
+    try:
+        for _ in range(3):  # a thread of another test may end meanwhile, but only once
+            gc.collect()
+            for letter in letters:
+                bench.ask(**letter)
+            found.append(gc.collect())
+    finally:
+        gc.enable()
+    assert min(found) == 0

@@ -1,0 +1,105 @@
+"""Daemon and clients find each other without being told where, and never in somebody else's directory."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from hapticd import paths
+from hapticd.errors import ConfigError, InstanceError
+from hapticd.paths import locate, make_runtime_directory, runtime_directory, telemetry_endpoint
+
+
+@pytest.fixture
+def user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Nothing in the environment, and a /run and /tmp of our own."""
+    for name in ("HAPTICD_RUNTIME_DIR", "RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(paths, "_RUN", tmp_path / "run" / "hapticd")
+    monkeypatch.setattr(paths, "_temporary", lambda: tmp_path / "tmp" / "hapticd-1000")
+    return tmp_path
+
+
+@pytest.fixture
+def not_root(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+
+
+def sockets_of(directory: Path) -> Path:
+    directory.mkdir(parents=True)
+    (directory / "telemetry").touch()
+    return directory / "telemetry"
+
+
+@pytest.mark.usefixtures("not_root")
+def test_the_environment_comes_first(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "/session")
+    assert runtime_directory("lab") == Path("/session/hapticd/lab")
+    monkeypatch.setenv("RUNTIME_DIRECTORY", "/run/hapticd/lab:/run/other")
+    assert runtime_directory("lab") == Path("/run/hapticd/lab")
+    assert telemetry_endpoint("lab") == "ipc:///run/hapticd/lab/telemetry"
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "mine"))
+    assert runtime_directory("lab") == user / "mine" / "lab"
+
+
+def test_a_unit_may_own_the_directory_of_one_or_of_all_instances(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("HAPTICD_RUNTIME_DIR", raising=False)
+    monkeypatch.setenv("RUNTIME_DIRECTORY", "/run/hapticd")
+    assert runtime_directory("default") == Path("/run/hapticd/default")
+
+
+def test_root_serves_the_system(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert runtime_directory() == user / "run" / "hapticd" / "default"
+
+
+@pytest.mark.usefixtures("not_root")
+def test_a_user_serves_the_session_or_else_below_tmp(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert runtime_directory() == user / "tmp" / "hapticd-1000" / "default"
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(user / "session"))
+    assert runtime_directory() == user / "session" / "hapticd" / "default"
+
+
+@pytest.mark.usefixtures("not_root")
+def test_a_client_prefers_the_systems_daemon_then_the_users(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(user / "session"))
+    assert locate("telemetry") == user / "session" / "hapticd" / "default" / "telemetry"
+    own = sockets_of(user / "session" / "hapticd" / "default")
+    assert locate("telemetry") == own
+    system = sockets_of(user / "run" / "hapticd" / "default")
+    assert locate("telemetry") == system
+    assert locate("telemetry", "other").parent.name == "other"
+
+
+def test_a_directory_is_made_once_and_below_tmp_for_its_user_alone(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "tmp" / "hapticd-1000"))
+    (user / "tmp").mkdir()
+    directory = make_runtime_directory("lab")
+    assert directory == make_runtime_directory("lab")
+    assert directory.parent.stat().st_mode & 0o777 == 0o700
+    assert directory.stat().st_mode & 0o777 == 0o700
+
+
+def test_somebody_elses_directory_below_tmp_is_not_used(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "tmp" / "hapticd-1000"))
+    (user / "elsewhere").mkdir()
+    (user / "tmp").mkdir()
+    (user / "tmp" / "hapticd-1000").symlink_to(user / "elsewhere")
+    with pytest.raises(InstanceError, match="belongs to somebody else; set HAPTICD_RUNTIME_DIR"):
+        make_runtime_directory()
+    assert list((user / "elsewhere").iterdir()) == []
+
+
+def test_a_directory_that_cannot_be_made_is_one_line(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (user / "file").touch()
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "file"))
+    with pytest.raises(InstanceError, match=r"file/default: cannot be made \(.+\); set HAPTICD_RUNTIME_DIR"):
+        make_runtime_directory()
+
+
+@pytest.mark.parametrize("name", ["", "..", "a/b", "-x", ".hidden", "a b", "x" * 33, "é"])
+def test_a_name_that_is_no_directory_is_refused(name: str) -> None:
+    with pytest.raises(ConfigError, match="instance = "):
+        runtime_directory(name)

@@ -1,0 +1,115 @@
+"""Finding drivers and laws by name."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from hapticd import plugins
+from hapticd.driver import Driver
+from hapticd.errors import PluginError
+
+GOOD_LAW = """
+from hapticd.law import LawParams
+class Params(LawParams):
+    pass
+class State:
+    x: float
+def start(state, params, snapshot): pass
+def step(state, params, tick): return tick.contact_n
+"""
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package of the user's own, `lab`."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab" / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("lab", "lab.law"):
+        monkeypatch.delitem(__import__("sys").modules, name, raising=False)
+    return tmp_path / "lab"
+
+
+def installed(monkeypatch: pytest.MonkeyPatch, **points: str) -> None:
+    """Pretend that these plug-ins are installed, in both groups."""
+    found = [
+        EntryPoint(name.replace("_", "-"), value, group)
+        for name, value in points.items()
+        for group in (plugins.DRIVERS, plugins.CONTROLLERS)
+    ]
+    monkeypatch.setattr(plugins, "entry_points", lambda **which: EntryPoints(found).select(**which))
+
+
+def test_what_the_distribution_ships_is_found_by_name() -> None:
+    assert "loopback" in plugins.names(plugins.DRIVERS)
+    assert {"none", "energy-cycle", "tdpa"} <= set(plugins.names(plugins.CONTROLLERS))
+    assert issubclass(plugins.driver("loopback"), Driver)
+    assert plugins.law("energy-cycle").__name__ == "hapticd_controllers.energy_cycle"
+
+
+def test_every_shipped_law_keeps_the_contract_and_every_driver_loads() -> None:
+    for name in plugins.names(plugins.CONTROLLERS):
+        assert isinstance(plugins.law(name), ModuleType)
+    for name in plugins.names(plugins.DRIVERS):
+        assert issubclass(plugins.driver(name), Driver)
+
+
+def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:
+    with pytest.raises(PluginError, match=r"no driver 'omega9': installed are .*loopback"):
+        plugins.driver("omega9")
+    with pytest.raises(PluginError, match=r"no law 'magic': installed are .*energy-cycle.*package\.module"):
+        plugins.law("magic")
+
+
+def test_a_law_of_ones_own_is_named_by_its_module(elsewhere: Path) -> None:
+    (elsewhere / "law.py").write_text(GOOD_LAW)
+    assert plugins.law("lab.law").__name__ == "lab.law"
+
+
+@pytest.mark.parametrize("name", ["lab.missing", "no_such_package.law", "lab.", ".", "..law"])
+def test_a_module_that_is_not_there_is_an_error_of_the_users(elsewhere: Path, name: str) -> None:
+    with pytest.raises(PluginError, match="cannot be imported"):
+        plugins.law(name)
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("1 / 0", "cannot be imported: ZeroDivisionError"),
+        ("def broken(:", "cannot be imported: SyntaxError"),
+        (GOOD_LAW.replace("def step", "def stop"), "has no `step`"),
+        (GOOD_LAW.replace("(LawParams)", ""), "Params must derive from"),
+        (GOOD_LAW.replace("x: float", "x: list[float]"), r"State\.x must be float, int or bool"),
+    ],
+)
+def test_a_module_that_is_no_law_is_refused_with_what_it_lacks(elsewhere: Path, source: str, said: str) -> None:
+    (elsewhere / "law.py").write_text(source)
+    with pytest.raises(PluginError, match=said):
+        plugins.law("lab.law")
+
+
+def test_an_installed_name_that_is_no_driver_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed(monkeypatch, wrong="math:pi", gone="no_such_module:Thing", not_a_class="json:loads")
+    assert plugins.names(plugins.DRIVERS) == ["gone", "not-a-class", "wrong"]
+    with pytest.raises(PluginError, match=r"math:pi is not a .*Driver"):
+        plugins.driver("wrong")
+    with pytest.raises(PluginError, match="json:loads is not"):
+        plugins.driver("not-a-class")
+    with pytest.raises(PluginError, match=r"gone \(no_such_module:Thing\) cannot be imported: ModuleNotFoundError"):
+        plugins.driver("gone")
+
+
+def test_an_installed_name_that_is_no_module_is_no_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed(monkeypatch, wrong="math:pi")
+    with pytest.raises(PluginError, match="is not a module"):
+        plugins.law("wrong")
+
+
+def test_with_nothing_installed_the_message_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed(monkeypatch)
+    with pytest.raises(PluginError, match="installed are none"):
+        plugins.driver("loopback")

@@ -1,0 +1,62 @@
+"""A loop that is faster than its device sees each sample several times: the hand is no faster for that."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import pytest
+
+from hapticd.config.models import VelocityConfig
+from tests.tick.rig import Rig
+
+PERIOD_S = 2.5e-4
+SPEED_M_PER_S = 0.6
+EVERY = 4
+
+
+def speeds_m_per_s(velocity: VelocityConfig, **declared: Any) -> list[float]:
+    """What a loop at 4 kHz makes of a hand that moves evenly, from a device that has news once a millisecond."""
+    rig = Rig(at_m=0.0, velocity=velocity, safety={"max_speed_m_per_s": 2.0 * SPEED_M_PER_S}, **declared)
+    seen = []
+    for number in range(1, 200):
+        if number % EVERY == 0:
+            rig.sample.position_m[0] = SPEED_M_PER_S * number * PERIOD_S
+            rig.sample.sequence += 1
+            rig.sample.time_ns = round(number * PERIOD_S * 1e9)
+        rig.tick.step(rig.sample, PERIOD_S)
+        seen.append(rig.tick.motion.velocity_m_per_s[0])
+    assert rig.tick.fault == 0
+    return seen[EVERY * 16 :]
+
+
+@pytest.mark.parametrize(
+    "velocity",
+    [{}, {"samples": 5}, {"estimator": "lowpass", "cutoff_hz": 300.0}, {"estimator": "foaw", "samples": 8}],
+    ids=str,
+)
+@pytest.mark.parametrize("kind", ["has_clock", "has_sequence"])
+def test_an_even_motion_has_an_even_velocity(kind: str, velocity: dict[str, Any]) -> None:
+    seen = speeds_m_per_s(VelocityConfig.model_validate(velocity), **{kind: True, "resolution_m": 1e-9})
+    assert seen == pytest.approx([SPEED_M_PER_S] * len(seen), rel=1e-3)
+
+
+def test_without_clock_and_count_nobody_can_tell_a_repeated_sample_from_a_rest() -> None:
+    rig = Rig(at_m=0.0)
+    for number in range(1, 9):
+        if number % EVERY == 0:
+            rig.sample.position_m[0] += SPEED_M_PER_S * EVERY * PERIOD_S
+        rig.tick.step(rig.sample, PERIOD_S)
+    assert rig.tick.motion.velocity_m_per_s[0] == pytest.approx(EVERY * SPEED_M_PER_S)
+
+
+def test_the_time_that_a_law_is_told_is_the_time_that_passed() -> None:
+    rig = Rig(at_m=0.0, has_sequence=True)
+    told = []
+    for _, fresh in itertools.product(range(20), (False, False, True)):
+        if fresh:
+            rig.sample.sequence += 1
+        rig.tick.step(rig.sample, PERIOD_S)
+        if fresh:
+            told.append(rig.tick.motion.dt_s)
+    assert told == pytest.approx([3 * PERIOD_S] * 20)

@@ -1,0 +1,90 @@
+"""Time and speed as a device tells them: frozen, running back, after a gap, too fast."""
+
+from __future__ import annotations
+
+import pytest
+
+from hapticd.config.models import VelocityConfig
+from hapticd.device import Sample
+from hapticd.errors import ConfigError
+from hapticd.tick.event import EventCode
+from hapticd.tick.tick import FROZEN_TICKS
+from tests.tick.rig import PERIOD_S, Rig, wall
+from tests.tick.transitions import pressed
+
+
+@pytest.mark.parametrize("kind", ["has_clock", "has_sequence"])
+def test_a_device_that_repeats_itself_is_frozen_after_twenty_samples(kind: str) -> None:
+    rig = pressed(**{kind: True})
+    sample = Sample(1)
+    sample.position_m[0], sample.time_ns, sample.sequence = -2e-3, rig.sample.time_ns, rig.sample.sequence
+    for count in range(FROZEN_TICKS):
+        assert rig.tick.fault == 0, count
+        assert rig.tick.step(sample, PERIOD_S) != [0.0]
+        assert rig.tick.motion.dt_s == PERIOD_S
+    assert rig.tick.fault == EventCode.DEVICE_FROZEN
+    assert rig.tick.guard.latched
+
+
+def test_a_device_that_is_still_frozen_fails_again_when_it_is_armed() -> None:
+    rig = pressed(has_clock=True)
+    for _ in range(100):
+        rig.tick.step(rig.sample, PERIOD_S)
+    assert rig.tick.fault == EventCode.DEVICE_FROZEN
+    rig.tick.fault = 0
+    rig.tick.guard.clear()
+    assert rig.tick.arm()
+    rig.tick.step(rig.sample, PERIOD_S)
+    assert rig.tick.fault == EventCode.DEVICE_FROZEN
+
+
+def test_a_clock_that_once_runs_back_is_one_bad_sample_and_no_fault() -> None:
+    rig = pressed(has_clock=True)
+    rig.force(-2e-3, dt_s=-5.0)
+    assert rig.tick.motion.dt_s == PERIOD_S
+    assert rig.force(-2e-3, ticks=30) == 4.0
+    assert rig.tick.fault == 0
+
+
+def test_after_a_long_gap_velocity_is_what_it_was_over_the_gap_and_laws_reckon_with_one_period() -> None:
+    """A computer that slept for 3 s finds the hand 30 mm further: that was 10 mm/s, and not 30 m/s."""
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True, safety={"max_speed_m_per_s": 1.0})
+    rig.force(0.03, dt_s=3.0)
+    assert rig.tick.motion.velocity_m_per_s == [pytest.approx(0.01)]
+    assert rig.tick.motion.dt_s == PERIOD_S
+    rig.force(0.03)
+    assert rig.tick.motion.velocity_m_per_s == [0.0]
+    assert rig.tick.fault == 0
+
+
+def test_while_the_clock_stands_still_the_last_velocity_stands() -> None:
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True)
+    rig.force(1e-3)
+    rig.force(3e-3, dt_s=0.0)
+    assert rig.tick.motion.velocity_m_per_s == [pytest.approx(1.0)]
+
+
+def test_a_device_that_is_too_fast_is_let_go_by_a_ramp() -> None:
+    rig = Rig(wall(2000.0), at_m=0.0, safety={"max_speed_m_per_s": 1.0})
+    rig.force(-0.9e-3)
+    assert rig.tick.fault == 0
+    forces = rig.forces(-2e-3, 60)
+    assert rig.tick.fault == EventCode.OVER_SPEED
+    assert "1.1 m/s" in rig.tick.fault_text
+    assert forces[0] == pytest.approx(4.0 * 0.98)
+    assert forces[-1] == 0.0
+    assert rig.tick.guard.latched
+
+
+def test_speed_counts_over_all_axes() -> None:
+    rig = Rig(axes="xyz", at_m=0.0, safety={"max_speed_m_per_s": 1.0})
+    rig.at(0.6e-3, 0.6e-3, 0.0)
+    assert rig.tick.fault == 0
+    rig.at(1.3e-3, 1.3e-3, 0.7e-3)
+    assert rig.tick.fault == EventCode.OVER_SPEED
+
+
+def test_a_device_without_velocity_cannot_be_asked_for_it() -> None:
+    with pytest.raises(ConfigError, match=r"velocity\.estimator.*a device does not measure"):
+        Rig(velocity=VelocityConfig(estimator="device"))
+    Rig(velocity=VelocityConfig(estimator="device"), has_velocity=True)
