@@ -28,7 +28,8 @@ from hapticd.device import DeviceInfo
 from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.records import Status
 from hapticd.telemetry.wire import Topic, measure_epoch_offset_ns
-from hapticd.tick.record import Flag, TickRecord, WallRecord
+from hapticd.tick.flags import Flag
+from hapticd.tick.record import TickRecord, WallRecord
 
 RATE_HZ = 1000
 PERIOD_NS = 1_000_000
@@ -189,7 +190,7 @@ def _tick(seq: int, deadline_ns: int) -> TickRecord:
     applied_n = min(wanted_n, 12.0)
     damping = 24.0 * (1.0 - math.exp(-t_s / 3.0))
     cycle = int(t_s * 9.0)
-    wall = WallRecord(inside, damping, 0.253, cycle, 1.1e-3, 2e-5 if cycle % 5 == 0 else 0.0, damping, 0.111)
+    wall = WallRecord(inside, 12e3, damping, 0.253, cycle, 1.1e-3, 2e-5 if cycle % 5 == 0 else 0.0, damping, 0.111)
     stored_j = 0.5 * _STIFFNESS_N_PER_M * x_m * x_m if inside else 0.0
     made_j = 2e-5 * (cycle // 5)
     dissipated_j = 3e-3 * stroke + 2e-3 * phase

@@ -62,7 +62,7 @@ def serve_threaded(connection: Connection, text: str, heavy: bool) -> None:
                 publisher.close()
 
         def stop(_signal: int, _frame: object) -> None:
-            control.stop_requested = True
+            control.session.stop_requested = True
 
         signal.signal(signal.SIGTERM, stop)
         shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
@@ -77,7 +77,7 @@ def serve_threaded(connection: Connection, text: str, heavy: bool) -> None:
             done.set()
             publishing.join()
         kept.ticks.dropped = kept.dropped
-        kept.ticks.fault = control.tick.fault_text
+        kept.ticks.fault = control.session.tick.fault_text
         connection.send(kept.ticks)
     except HapticdError as error:
         connection.send(HapticdError(str(error)))

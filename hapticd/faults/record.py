@@ -51,14 +51,13 @@ class FaultRecord:
         return int(self.header["event"]["deadline_ns"])
 
 
-def encode(header: dict[str, Any], layout: RecordLayout, rows: Iterator[bytes], max_walls: int) -> bytes:
+def encode(header: dict[str, Any], layout: RecordLayout, rows: Iterator[bytes]) -> bytes:
     """A fault record as bytes.
 
     Args:
         header: what the record says of itself.
         layout: how the rows lie.
         rows: whole rows, any number in each piece.
-        max_walls: most walls that a row can hold.
     """
     compressor = zlib.compressobj(level=1)
     packed = bytearray()
@@ -70,10 +69,10 @@ def encode(header: dict[str, Any], layout: RecordLayout, rows: Iterator[bytes], 
     ticks = {
         "count": size // layout.size,
         "bytes": layout.size,
-        "format": layout.struct(max_walls).format,
+        "format": layout.format,
         "axes": layout.axes,
         "orientation": layout.orientation,
-        "max_walls": max_walls,
+        "max_walls": layout.max_walls,
     }
     said = json.dumps({**header, "ticks": ticks}, allow_nan=False).encode()
     return MAGIC + said + b"\n" + bytes(packed)
@@ -98,7 +97,7 @@ def read(path: Path) -> FaultRecord:
     try:
         ticks = header["ticks"]
         layout = RecordLayout(ticks["axes"], ticks["orientation"], ticks["max_walls"])
-        if ticks["format"] != layout.struct(ticks["max_walls"]).format:
+        if ticks["format"] != layout.format:
             raise HapticdError(f"{path}: its ticks are laid out as hapticd {header['version']} does; read it with that")
         rows = memoryview(zlib.decompress(packed))
         found = [layout.unpack(rows[at : at + layout.size]) for at in range(0, len(rows), layout.size)]

@@ -7,25 +7,14 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticd.config.models import LoopConfig, SafetyConfig
-from hapticd.device import Sample
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
-from hapticd.loop.memory import (
-    CONTROL_BEAT,
-    DISARM,
-    DISARMED,
-    DONE,
-    MAIL,
-    RECORDS,
-    SKIPPED,
-    SUPERVISOR_BEAT,
-    SharedMemory,
-)
+from hapticd.loop.memory import ANSWERED, DISARM, DISARMED, RECORDS, REQUESTS, SKIPPED, SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.requests import RequestHandler
 from hapticd.loop.resume import FROM_START, ResumeState
-from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.loop.session import Session
+from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
-from hapticd.tick.record import Flag
 from hapticd.tick.tick import ControlTick
 
 BUDGET_TICKS = 10
@@ -33,15 +22,13 @@ BUDGET_MISSES = 3
 """A law fails when this many of the last `BUDGET_TICKS` ticks computed for longer than the budget."""
 
 STOP_RAMP_S = 0.05
-"""Longest ramp to zero at a stop [s]: whoever killed the supervisor may not have the patience for more."""
+"""Longest ramp to zero at a stop [s]: what killed the supervisor may not wait for more."""
 
 BURST_TICKS = 10
 """Deadlines skipped in one go that are worth an event, one a second at most."""
 
 LATE_S = 0.05
-"""A real device is released when so much more time was skipped than kept: its last force was held all the while [s]."""
-
-_UNCALIBRATED = int(Flag.UNCALIBRATED)
+"""A real device is released when this much more time was skipped than kept: its last force was held for it [s]."""
 
 
 class ControlLoop:
@@ -55,10 +42,11 @@ class ControlLoop:
         safety: the [safety] table.
         auto_arm: arm as soon as the loop runs.
         sleep_until: sleeps to a CLOCK_MONOTONIC time and returns when it woke [ns].
-        before: where the loop before stopped, when this one goes on for it.
+        resume: where the loop before stopped, when this one goes on for it.
 
     Attributes:
-        stop_requested: set by a signal or a letter; the force is ramped to zero and the loop ends.
+        session: what it shares with the requests that change it.
+        requests: works off what the supervisor asks for.
     """
 
     def __init__(
@@ -70,50 +58,17 @@ class ControlLoop:
         safety: SafetyConfig,
         auto_arm: bool,
         sleep_until: Callable[[int], int],
-        before: ResumeState = FROM_START,
+        resume: ResumeState = FROM_START,
     ) -> None:
-        self.driver = driver
-        self.tick = tick
-        self.shared = shared
-        self.loop = loop
-        self.stop_requested = False
-        self.law_count = before.law
-        self.seq = before.seq
-        self._skipped = before.skipped
-        tick.guard.latched = before.latched
-        self._deadline_ns = 0
-        self._burst_due_ns = 0
-        self._sleep_until = sleep_until
+        self.session = Session(driver, tick, shared, safety.supervisor_stall_s, resume)
+        self.requests = RequestHandler(self.session)
+        self._loop = loop
         self._auto_arm = auto_arm
-        layout = shared.layout
-        self._area = shared.record_area
-        self._slots = shared.slots
-        self._slot_size = layout.size
-        self._has_orientation = layout.orientation
-        self._packs = [layout.struct(walls).pack_into for walls in range(layout.max_walls + 1)]
-        driver.share_metrics(shared.metrics)
-        self.requests = RequestHandler(self)
-        self.stall_ns = int(safety.supervisor_stall_s * 1e9)
+        self._sleep_until = sleep_until
+        self._burst_due_ns = 0
         self._stopping = False
         self._stalled = False
-
-    def event(self, code: EventCode, text: str, **fields: float | int | str) -> None:
-        """Tell the supervisor that something happened."""
-        at_ns = self._deadline_ns or time.monotonic_ns()  # before the first tick there is no deadline
-        self.shared.write_event(LoopEvent(code, text, self.seq, at_ns, fields))
-
-    def arm(self) -> bool:
-        """Enable the device and let forces through; False while latched or on the way out.
-
-        Raises:
-            DriverError: the device refuses.
-        """
-        if self.tick.guard.latched or self.stop_requested:
-            return False
-        self.driver.enable()
-        self.tick.arm()
-        self.event(EventCode.ARMED, "armed: forces are let through")
-        return True
+        driver.share_metrics(shared.metrics)
 
     def run(self) -> None:
         """Tick until a stop is requested; whatever happens, the device is left without force.
@@ -121,65 +76,74 @@ class ControlLoop:
         Raises:
             DriverError: the device was lost.
         """
+        session = self.session
         try:
             self.requests.worker.start()
-            self._run()
+            self._start()
+            try:
+                self._run()
+            finally:
+                self._leave()
         except DriverError as error:
             if isinstance(error, DeviceFaultError):
-                self.event(EventCode.DEVICE_FAULT, f"the device reports a fault: {error}")
+                session.latch()
+                session.event(EventCode.DEVICE_FAULT, f"the device reports a fault: {error}")
             else:
-                self.event(EventCode.DEVICE_LOST, f"device lost: {error}")
+                session.event(EventCode.DEVICE_LOST, f"device lost: {error}")
             raise
         finally:
-            self.driver.close()
+            session.driver.close()
             self.requests.worker.end()
 
     def _start(self) -> None:
         """Find out where the device is, and arm it where that needs no one's word."""
+        session = self.session
         try:
-            self.tick.start(self.driver.read())
+            session.tick.start(session.driver.read())
         except HapticdError:
             raise
         except Exception as error:
             raise _nonsense(error) from error
-        self.event(EventCode.STARTED, f"the loop runs at {self.loop.rate_hz:g} Hz", rate_hz=self.loop.rate_hz)
+        rate_hz = self._loop.rate_hz
+        session.event(EventCode.STARTED, f"the loop runs at {rate_hz:g} Hz", rate_hz=rate_hz)
         if self._auto_arm:
-            try:
-                self.arm()
-            except DriverError as error:
-                self.event(EventCode.DISARMED, f"stays disarmed: {error}")
+            session.enable_or_tell()
 
     def _run(self) -> None:
-        driver = self.driver
-        tick = self.tick
+        session = self.session
+        driver = session.driver
+        tick = session.tick
         guard = tick.guard
-        shared = self.shared
+        shared = session.shared
         words = shared.words
+        requests = self.requests
         sleep_until = self._sleep_until
         read = driver.read
         write = driver.write
         step = tick.step
         monotonic_ns = time.monotonic_ns
         thread_time_ns = time.thread_time_ns
-        period_ns = self.loop.period_ns
+        period_ns = self._loop.period_ns
         disarmed = Mode.DISARMED
         enabled = DriverState.ENABLED
-        budget_ns = int(self.loop.law_budget * period_ns)
+        budget_ns = int(self._loop.law_budget * period_ns)
         all_ticks = (1 << BUDGET_TICKS) - 1
         most_late = max(BURST_TICKS, int(LATE_S * 1e9) // period_ns)
         misses = 0
         late = 0
-        words[SKIPPED] = skipped = self._skipped
-        busy_us = 0.0
+        skipped = session.skipped
+        area = shared.record_area
+        slots = shared.slots
+        size = shared.layout.size
+        pack = shared.layout.pack
 
-        self._start()
         # Deadlines are whole multiples of the period, so that an outside witness can share them.
         deadline_ns = monotonic_ns() // period_ns * period_ns + 2 * period_ns
         last_ns = deadline_ns - period_ns
         cpu_ns = thread_time_ns()
         while True:
             woke_ns = sleep_until(deadline_ns)
-            self._deadline_ns = deadline_ns
+            session.deadline_ns = deadline_ns
 
             try:
                 sample = read()
@@ -189,22 +153,34 @@ class ControlLoop:
                 last_ns = woke_ns
 
                 if tick.fault:
-                    self._report_fault()
+                    session.report_fault()
                 busy_us = (monotonic_ns() - woke_ns) * 1e-3
-                self._record(sample, deadline_ns, (woke_ns - deadline_ns) * 1e-3, busy_us, skipped)
+                written = words[RECORDS]
+                pack(
+                    area,
+                    written % slots * size,
+                    tick,
+                    sample,
+                    session.seq,
+                    deadline_ns,
+                    (woke_ns - deadline_ns) * 1e-3,
+                    busy_us,
+                    skipped,
+                    session.law_count,
+                )
+                words[RECORDS] = written + 1
             except HapticdError:
                 raise
             except Exception as error:  # a law's are caught in the tick, so this is the driver's
                 raise _nonsense(error) from error
-            words[CONTROL_BEAT] = woke_ns
 
-            if words[MAIL] != words[DONE]:
-                used_ns = thread_time_ns()
-                self.requests.work()
-                cpu_ns += thread_time_ns() - used_ns  # no law is to answer for what somebody asked for
             if words[DISARM] != words[DISARMED]:
-                self.requests.disarm()
-            if self.stop_requested and not self._stopping:
+                session.disarm()
+            if words[REQUESTS] != words[ANSWERED]:
+                used_ns = thread_time_ns()
+                requests.work()
+                cpu_ns += thread_time_ns() - used_ns  # a law does not answer for what was asked for
+            if session.stop_requested and not self._stopping:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
             if guard.mode is disarmed:
@@ -212,27 +188,29 @@ class ControlLoop:
                     driver.disable()
                 if self._stopping:
                     return
-            if words[SUPERVISOR_BEAT] + self.stall_ns < woke_ns:
+            if words[SUPERVISOR_BEAT] + session.stall_ns < woke_ns:
                 if not self._stalled:
                     self._stalled = True
-                    tick.fail(EventCode.SUPERVISOR_STALLED, f"no sign of the supervisor for {self.stall_ns * 1e-9:g} s")
+                    tick.fail(
+                        EventCode.SUPERVISOR_STALLED, f"no sign of the supervisor for {session.stall_ns * 1e-9:g} s"
+                    )
             elif self._stalled:
                 self._stalled = False
 
-            self.seq += 1
+            session.seq += 1
             deadline_ns += period_ns
             now_ns = monotonic_ns()
             if deadline_ns < now_ns:
                 behind = (now_ns - deadline_ns) // period_ns + 1
                 skipped += behind
                 deadline_ns += behind * period_ns
-                words[SKIPPED] = skipped
+                words[SKIPPED] = session.skipped = skipped
                 late += behind
                 if late >= most_late and guard.mode is Mode.ARMED and not tick.info.simulated:
                     tick.fail(EventCode.LOOP_LATE, f"{late} more deadlines were missed than met")
                 elif behind >= BURST_TICKS and now_ns >= self._burst_due_ns:
                     self._burst_due_ns = now_ns + 1_000_000_000
-                    self.event(EventCode.OVERRUN_BURST, f"{behind} deadlines were missed at once", skipped=behind)
+                    session.event(EventCode.OVERRUN_BURST, f"{behind} deadlines were missed at once", skipped=behind)
             elif late:
                 late -= 1
 
@@ -247,75 +225,13 @@ class ControlLoop:
                         f"the tick computed for more than {budget_ns * 1e-3:.0f} us in {BUDGET_MISSES} of "
                         f"{BUDGET_TICKS} ticks",
                     )
-                    self._report_fault()
+                    session.report_fault()
             cpu_ns = used_ns
 
-    def _record(self, sample: Sample, deadline_ns: int, late_us: float, busy_us: float, skipped: int) -> None:
-        tick = self.tick
-        motion = tick.motion
-        past = tick.past
-        energy_j = past.energy_j
-        stored_j = past.stored_j
-        dissipated_j = past.dissipated_j
-        generated_j = past.generated_j
-        walls: list[float] = []
-        for contact in tick.contacts:
-            ledger = contact.ledger
-            energy_j += ledger.energy_j
-            stored_j += ledger.stored_j
-            dissipated_j += ledger.dissipated_j
-            generated_j += ledger.generated_j
-            walls += (
-                contact.in_contact,
-                contact.damping_n_s_per_m,
-                contact.felt_mass_kg,
-                ledger.cycle,
-                ledger.cycle_energy_j,
-                ledger.cycle_generated_j,
-                ledger.cycle_damping_n_s_per_m,
-                ledger.cycle_duration_s,
-            )
-        for contact in tick.leaving:
-            ledger = contact.ledger
-            energy_j += ledger.energy_j
-            stored_j += ledger.stored_j
-            dissipated_j += ledger.dissipated_j
-            generated_j += ledger.generated_j
-        words = self.shared.words
-        written = words[RECORDS]
-        count = len(tick.contacts)
-        self._packs[count](
-            self._area,
-            written % self._slots * self._slot_size,
-            self.seq,
-            deadline_ns,
-            late_us,
-            busy_us,
-            motion.dt_s,
-            skipped,
-            tick.flags if sample.calibrated else tick.flags | _UNCALIBRATED,
-            self.law_count,
-            sample.buttons,
-            sample.gripper_m,
-            energy_j,
-            stored_j,
-            dissipated_j,
-            generated_j,
-            count,
-            *motion.position_m,
-            *motion.velocity_m_per_s,
-            *tick.force_n,
-            *tick.requested_n,
-            *(sample.orientation if self._has_orientation else ()),
-            *walls,
-        )
-        words[RECORDS] = written + 1
-
-    def _report_fault(self) -> None:
-        tick = self.tick
-        if tick.fault:
-            self.event(EventCode(tick.fault), tick.fault_text)
-            tick.fault = 0
+    def _leave(self) -> None:
+        """Tell of a fault of the last tick, and leave what the next loop on this device goes on from."""
+        self.session.report_fault()
+        self.session.leave()
 
 
 def _nonsense(error: Exception) -> DriverError:

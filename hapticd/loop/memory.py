@@ -1,6 +1,6 @@
 """The memory that the control process and the supervisor share.
 
-    words | the driver's metrics | verdict | mailbox | events | tick records
+    words | the driver's metrics | answer | request | events | tick records
 
 One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
 copied a slot: on x86 stores become visible in order, so what was not overwritten meanwhile is whole. Other machines
@@ -26,15 +26,28 @@ from hapticd.tick.record import RecordLayout, TickRecord
 HISTORY_S = 8.0
 """How much of the past the ring of records holds [s]."""
 
-RECORDS, CONTROL_BEAT, SUPERVISOR_BEAT, MAIL, MAIL_LENGTH, DONE, EVENTS, SKIPPED, DISARM, DISARMED = range(10)
-"""Words: records written, heartbeats [ns], letters sent, their length, letters answered, events, skipped deadlines, and
-how often disarming was asked for and done, which waits behind no letter."""
+(
+    RECORDS,  # records written
+    EVENTS,  # events written
+    SUPERVISOR_BEAT,  # when the supervisor last showed that it lives [ns of CLOCK_MONOTONIC]
+    REQUESTS,  # requests sent
+    REQUEST_LENGTH,  # of the last one [bytes]
+    ANSWERED,  # requests answered
+    DISARM,  # how often disarming was asked for, which waits behind no request
+    DISARMED,  # and how often it was done
+    NEXT_SEQ,  # what the loop leaves to the next one: `hapticd.loop.resume`
+    SKIPPED,
+    LAW,
+    MAY_ARM,
+    LATCHED,
+) = range(13)
+"""Words, each written by one side only."""
 
 _METRICS = 2048
-_VERDICT = 4096
-_MAILBOX = 8192
-_MAILBOX_SIZE = 1 << 18
-_EVENTS = _MAILBOX + _MAILBOX_SIZE
+_ANSWER = 4096
+_REQUEST = 8192
+_REQUEST_SIZE = 1 << 18
+_EVENTS = _REQUEST + _REQUEST_SIZE
 _EVENT_SIZE = 1024
 _EVENT_SLOTS = 256
 _RECORDS = _EVENTS + _EVENT_SIZE * _EVENT_SLOTS
@@ -85,7 +98,7 @@ class SharedMemory:
         os.close(self.descriptor)
 
     def write_event(self, event: LoopEvent) -> None:
-        """Append an event (control side); text that does not fit is cut."""
+        """Append an event (loop side); text that does not fit is cut."""
         text = event.text.encode(errors="replace")[:600].decode(errors="ignore")
         row: bytes = msgpack.packb([event.code, text, event.seq, event.deadline_ns, event.fields])
         if len(row) > _EVENT_SIZE - 8:
@@ -95,38 +108,37 @@ class SharedMemory:
         self.view[start + 8 : start + 8 + len(row)] = row
         self.words[EVENTS] += 1
 
-    def post(self, letter: dict[str, Any]) -> int:
-        """Send a letter to the loop (supervisor side); returns its number.
+    def post(self, request: dict[str, Any]) -> None:
+        """Send a request to the loop (supervisor side).
 
         Raises:
             HapticdError: the one before is not answered yet, or it is too long.
         """
-        if self.words[DONE] != self.words[MAIL]:
+        if self.words[ANSWERED] != self.words[REQUESTS]:
             raise HapticdError("the control loop is still busy with the request before")
-        packed: bytes = msgpack.packb(letter)
-        if len(packed) > _MAILBOX_SIZE:
-            raise HapticdError(f"the request is {len(packed)} bytes long, {_MAILBOX_SIZE} fit")
-        self.view[_MAILBOX : _MAILBOX + len(packed)] = packed
-        self.words[MAIL_LENGTH] = len(packed)
-        self.words[MAIL] += 1
-        return self.words[MAIL]
+        packed: bytes = msgpack.packb(request | {"disarm": self.words[DISARM]})
+        if len(packed) > _REQUEST_SIZE:
+            raise HapticdError(f"the request is {len(packed)} bytes long, {_REQUEST_SIZE} fit")
+        self.view[_REQUEST : _REQUEST + len(packed)] = packed
+        self.words[REQUEST_LENGTH] = len(packed)
+        self.words[REQUESTS] += 1
 
-    def letter(self) -> dict[str, Any]:
-        """The letter that waits (control side)."""
-        unpacked: dict[str, Any] = msgpack.unpackb(self.view[_MAILBOX : _MAILBOX + self.words[MAIL_LENGTH]])
+    def request(self) -> dict[str, Any]:
+        """The request that waits (loop side); `disarm` is how often disarming had been asked for when it was sent."""
+        unpacked: dict[str, Any] = msgpack.unpackb(self.view[_REQUEST : _REQUEST + self.words[REQUEST_LENGTH]])
         return unpacked
 
     def answer(self, verdict: str) -> None:
-        """Answer it (control side): "" is done, anything else says why not."""
-        row = verdict.encode(errors="replace")[: _MAILBOX - _VERDICT - 8]
-        self.view[_VERDICT : _VERDICT + 8] = len(row).to_bytes(8, "little")
-        self.view[_VERDICT + 8 : _VERDICT + 8 + len(row)] = row
-        self.words[DONE] = self.words[MAIL]
+        """Answer it (loop side): "" is done, anything else says why not."""
+        row = verdict.encode(errors="replace")[: _REQUEST - _ANSWER - 8]
+        self.view[_ANSWER : _ANSWER + 8] = len(row).to_bytes(8, "little")
+        self.view[_ANSWER + 8 : _ANSWER + 8 + len(row)] = row
+        self.words[ANSWERED] = self.words[REQUESTS]
 
     def verdict(self) -> str:
-        """The answer to the last letter (supervisor side)."""
-        length = int.from_bytes(self.view[_VERDICT : _VERDICT + 8], "little")
-        return bytes(self.view[_VERDICT + 8 : _VERDICT + 8 + length]).decode(errors="replace")
+        """The answer to the last request (supervisor side)."""
+        length = int.from_bytes(self.view[_ANSWER : _ANSWER + 8], "little")
+        return bytes(self.view[_ANSWER + 8 : _ANSWER + 8 + length]).decode(errors="replace")
 
 
 class RecordReader:
@@ -144,6 +156,11 @@ class RecordReader:
         self._area = shared.record_area
         self._next = 0
         self.dropped = 0
+
+    @property
+    def fetched(self) -> int:
+        """How many records were read or passed over so far."""
+        return self._next
 
     def read(self, most: int = 4096) -> list[TickRecord]:
         """The records that are new, oldest first, at most so many."""

@@ -74,15 +74,15 @@ def main() -> int:
 def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
     request = msgpack.unpackb(sys.stdin.buffer.read())
     config = parse(request["text"], request["name"])
-    before = ResumeState(**request["before"])
+    resume = ResumeState(**request["resume"])
     settings = config.config
     config, accuracy = _fitted(config)
     driver = config.driver(config.options, settings.loop.period_s)
     place_device(config, driver)
     info = driver.open()
     try:
-        if before.device not in ("", identity(info)):
-            raise DeviceNotFoundError(f"found {identity(info)} instead of {before.device}: restart hapticd to use it")
+        if resume.device not in ("", identity(info)):
+            raise DeviceNotFoundError(f"found {identity(info)} instead of {resume.device}: restart hapticd to use it")
         _check_watchdog(config, info)
         layout = RecordLayout(len(info.axes), info.has_orientation, MAX_WALLS)
         shared = SharedMemory(layout, settings.loop.rate_hz)
@@ -93,9 +93,9 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
             shared,
             settings.loop,
             settings.safety,
-            (info.simulated or settings.safety.auto_arm) and before.may_arm,
+            (info.simulated or settings.safety.auto_arm) and resume.may_arm,
             sleep_until,
-            before,
+            resume,
         )
         for name, law in _installed_laws().items():
             control.requests.know(name, law)
@@ -103,7 +103,7 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
         _warm_up(make_tick(config, info))
 
         def stop(_signal: int, _frame: object) -> None:
-            control.stop_requested = True
+            control.session.stop_requested = True
 
         signal.signal(signal.SIGTERM, stop)
         die_with_parent(parent_pid)

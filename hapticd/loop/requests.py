@@ -8,37 +8,37 @@ from __future__ import annotations
 import sys
 from collections.abc import Generator
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from hapticd import plugins
 from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
 from hapticd.driver import DriverState
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import DISARM, DISARMED
+from hapticd.loop.memory import DISARM
+from hapticd.loop.session import Session
 from hapticd.loop.worker import Worker
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
 
-if TYPE_CHECKING:
-    from hapticd.loop.loop import ControlLoop
-
 _SWITCH_INTERVAL_S = 5e-5
 """How soon an import that runs beside the loop gives the interpreter back to it [s]."""
+
+DISARMED_SINCE = "not done: disarming was asked for after it"
 
 
 class RequestHandler:
     """Answers the supervisor's requests.
 
     Args:
-        loop: the loop that they are for.
+        session: the loop that they are for.
 
     Attributes:
-        beside: what takes longer than a slice; started before the first letter.
+        worker: does what takes longer than a slice; started before the first request.
     """
 
-    def __init__(self, loop: ControlLoop) -> None:
-        self._loop = loop
+    def __init__(self, session: Session) -> None:
+        self._session = session
         self._work: Generator[None, None, None] | None = None
         self._laws: dict[str, ModuleType] = {}
         self.worker = Worker()
@@ -48,12 +48,18 @@ class RequestHandler:
         self._laws[name] = law
 
     def work(self) -> None:
-        """Do the next slice of the letter that waits; answer it when it is done."""
-        shared = self._loop.shared
+        """Do the next slice of the request that waits; answer it when it is done.
+
+        One that would put forces on is refused when disarming was asked for after it was sent.
+        """
+        shared = self._session.shared
         try:
             if self._work is None:
-                letter = shared.letter()
-                self._work = getattr(self, f"_do_{letter.pop('do')}")(**letter)
+                request = shared.request()
+                do = request.pop("do")
+                if request.pop("disarm") != shared.words[DISARM] and do in ("arm", "calibrate"):
+                    raise HapticdError(DISARMED_SINCE)
+                self._work = getattr(self, f"_do_{do}")(**request)
             next(self._work)
         except StopIteration:
             self._work = None
@@ -63,62 +69,54 @@ class RequestHandler:
             text = str(error) if isinstance(error, HapticdError) else f"{type(error).__name__}: {error}"
             shared.answer(text or type(error).__name__)
 
-    def disarm(self) -> None:
-        """Let go, whatever else is being worked off; a calibration is called off."""
-        words = self._loop.shared.words
-        asked = words[DISARM]
-        self._loop.tick.release()
-        self._loop.event(EventCode.DISARMED, "disarmed: the force is ramped to zero")
-        words[DISARMED] = asked
-
     def _do_arm(self) -> Generator[None, None, None]:
-        if not self._loop.arm():
+        if not self._session.arm():
             raise HapticdError("stopped by a fault: `hapticd clear` first")
         yield
 
     def _do_clear(self) -> Generator[None, None, None]:
-        self._loop.tick.guard.clear()
-        self._loop.event(EventCode.CLEARED, "fault cleared; the device stays disarmed")
+        self._session.tick.guard.clear()
+        self._session.event(EventCode.CLEARED, "fault cleared; the device stays disarmed")
         yield
 
     def _do_calibrate(self) -> Generator[None, None, None]:
-        """Calibrate beside the loop, which goes on reading; nobody arms meanwhile, since letters wait in line.
+        """Calibrate beside the loop, which goes on reading; nothing arms until it is done, since requests wait in line.
 
-        Who asks to disarm meanwhile wants the arm to stop.
+        To ask for disarming is to call it off.
         """
-        loop = self._loop
-        if loop.tick.guard.mode is not Mode.DISARMED or loop.driver.state is not DriverState.OPEN:
+        session = self._session
+        if session.tick.guard.mode is not Mode.DISARMED or session.driver.state is not DriverState.OPEN:
             raise HapticdError("calibration moves the arm by itself: `hapticd disarm` first")
-        loop.event(EventCode.CALIBRATING, "calibrating: the arm moves by itself")
+        session.event(EventCode.CALIBRATING, "calibrating: the arm moves by itself")
         ended: list[Exception | None] = []
 
         def calibrate() -> None:
             try:
-                loop.driver.calibrate()
+                session.driver.calibrate()
                 ended.append(None)
             except Exception as error:  # noqa: BLE001 - handed over to whoever asked
                 ended.append(error)
 
-        words = loop.shared.words
+        words = session.shared.words
         disarmed = words[DISARM]
         self.worker.do(calibrate)
         while not ended:
             if words[DISARM] != disarmed:
-                loop.driver.call_off()
+                session.driver.call_off()
             yield
         if ended[0] is not None:
-            loop.event(EventCode.CALIBRATION_ENDED, f"the calibration ended early: {ended[0]}")
+            session.event(EventCode.CALIBRATION_ENDED, f"the calibration ended early: {ended[0]}")
         _raise(ended)
-        loop.tick.forget_origin()
-        loop.event(EventCode.CALIBRATED, "calibrated")
+        session.tick.forget_origin()
+        session.event(EventCode.CALIBRATED, "calibrated")
 
     def _do_tare(self) -> Generator[None, None, None]:
-        tick = self._loop.tick
+        tick = self._session.tick
         if not tick.tare():
             raise HapticdError("tare moves the walls: `hapticd disarm` first, and the device must know where it is")
         axes = zip(tick.info.axes, tick.motion.origin_m, strict=True)
         origin_m: dict[str, float | int | str] = {f"origin_{axis}_m": origin for axis, origin in axes}
-        self._loop.event(EventCode.TARED, "tared: positions count from here", **origin_m)
+        self._session.event(EventCode.TARED, "tared: positions count from here", **origin_m)
         yield
 
     def _do_switch(
@@ -132,8 +130,8 @@ class RequestHandler:
         config: str,
     ) -> Generator[None, None, None]:
         """Take another law, scene and limits; all or nothing. A law that did not change keeps what it has learnt."""
-        loop = self._loop
-        tick = loop.tick
+        session = self._session
+        tick = session.tick
         if law not in self._laws:
             yield from self._import(law)
         module = self._laws[law]
@@ -149,11 +147,11 @@ class RequestHandler:
         new_scene = SceneConfig.model_validate({**scene, "walls": walls})
         yield
         tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
-        loop.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
+        session.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
         if not keep_law:
-            loop.law_count += 1
+            session.law_count += 1
         change = f"law {law} goes on" if keep_law else f"law {was} -> {law}"
-        loop.event(EventCode.SWITCHED, f"configuration {config}: {change}", law_before=was, law=law, config=config)
+        session.event(EventCode.SWITCHED, f"configuration {config}: {change}", law_before=was, law=law, config=config)
 
     def _import(self, name: str) -> Generator[None, None, None]:
         """Import a law beside the loop; its ticks go on, late by the switch interval.
@@ -181,7 +179,7 @@ class RequestHandler:
 def _raise(ended: list[Exception | None]) -> None:
     """Raise what a thread has handed over, if anything.
 
-    Nobody keeps it: an error knows the frames that it went through, and in this process no collector breaks cycles.
+    It is not kept: an error knows the frames that it went through, and in this process no collector breaks cycles.
     """
     if ended[0] is not None:
         raise cast(Exception, ended.pop())

@@ -1,10 +1,11 @@
-"""What the control process before left behind, for the one that goes on with the device once it is found again."""
+"""What a loop leaves behind for the one that goes on with the device once it is found again."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from hapticd.device import DeviceInfo
+from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED, SharedMemory
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,25 @@ class ResumeState:
 
 
 FROM_START = ResumeState()
-"""What the first control process follows."""
+"""What the first loop goes on from."""
+
+
+def left_by(shared: SharedMemory, info: DeviceInfo) -> ResumeState:
+    """What a loop has left; one that was still to disarm leaves a device that stays disarmed.
+
+    Args:
+        shared: its memory.
+        info: its device.
+    """
+    words = shared.words
+    return ResumeState(
+        seq=words[NEXT_SEQ],
+        skipped=words[SKIPPED],
+        law=words[LAW],
+        may_arm=bool(words[MAY_ARM]) and words[DISARM] == words[DISARMED],
+        latched=bool(words[LATCHED]),
+        device=identity(info),
+    )
 
 
 def identity(info: DeviceInfo) -> str:

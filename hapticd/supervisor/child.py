@@ -162,13 +162,13 @@ class LoopStart:
 
     Args:
         config: what it shall run.
-        before: where the loop before stopped, when this one goes on for it.
+        resume: where the loop before stopped, when this one goes on for it.
     """
 
-    def __init__(self, config: LoadedConfig, before: ResumeState = FROM_START) -> None:
+    def __init__(self, config: LoadedConfig, resume: ResumeState = FROM_START) -> None:
         self._config = config
         self._give_up_s = time.monotonic() + TIMEOUT_S
-        request = msgpack.packb({"text": config.text, "name": str(config.path), "before": asdict(before)})
+        request = msgpack.packb({"text": config.text, "name": str(config.path), "resume": asdict(resume)})
         self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # The request lies in a file, so that nobody waits for the other side to read it.
         with theirs, os.fdopen(os.memfd_create("request"), "w+b") as file:

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgpack
 import zmq
@@ -18,8 +17,6 @@ import zmq
 from hapticd.errors import InstanceError
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
-from hapticd.supervisor.request_queue import Answer
-from hapticd.tick.event import EventCode
 
 _LARGEST_REQUEST = 1 << 16
 _MOST_AT_ONCE = 50
@@ -125,65 +122,3 @@ def _decoded(frames: list[bytes]) -> dict[str, Any] | None:
     if not isinstance(request, dict) or not isinstance(request.get("do"), str):
         return None
     return request if all(isinstance(key, str) for key in request) else None
-
-
-if TYPE_CHECKING:
-    from hapticd.supervisor.daemon import Daemon
-
-KNOWN = ("status", "arm", "disarm", "calibrate", "tare", "clear", "reload", "stop")
-"""What the control socket understands."""
-
-
-class CommandHandler:
-    """Obeys the control socket.
-
-    Args:
-        service: the daemon that it is for.
-    """
-
-    def __init__(self, service: Daemon) -> None:
-        self._service = service
-
-    def turn(self) -> None:
-        """Do what has been asked for, or pass it on to the loop, whose answer comes later."""
-        service = self._service
-        for request, reply in service.commands.receive():
-            match request["do"]:
-                case "status":
-                    reply(True, status=service.report.status.as_map())
-                case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if service.recovery.lost:
-                    self._without_device(do, reply)
-                case "disarm":
-                    service.requests.disarm(_answering(reply))
-                case "arm" | "calibrate" | "tare" | "clear" as do:
-                    service.requests.submit({"do": do}, _answering(reply))
-                case "reload" if request.get("wait"):
-                    service.reload.ask(_answering(reply))
-                case "reload":
-                    reply(True)
-                    service.reload.ask()
-                case "stop":
-                    service.stop("asked over the control socket")
-                    reply(True)
-                case other:
-                    reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
-
-    def _without_device(self, do: str, reply: Reply) -> None:
-        """What can be done while the device is away is said to the loop that will find it again."""
-        service = self._service
-        recovery = service.recovery
-        match do:
-            case "arm" | "calibrate" | "tare":
-                reply(False, f"there is no device to {do}: {recovery.why}")
-            case "disarm":
-                recovery.amend(replace(recovery.before, may_arm=False))
-                service.tell_now(EventCode.DISARMED, "the device stays disarmed when it is back")
-                reply(True)
-            case _:
-                recovery.amend(replace(recovery.before, latched=False))
-                service.tell_now(EventCode.CLEARED, "fault cleared")
-                reply(True)
-
-
-def _answering(reply: Reply) -> Answer:
-    return lambda verdict: reply(not verdict, verdict)

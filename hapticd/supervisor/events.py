@@ -1,4 +1,4 @@
-"""What happened, told to everyone whom it concerns: the log, subscribers, the status, the fault record."""
+"""The event log: what happened goes to the log, to subscribers, into the status and into fault records."""
 
 from __future__ import annotations
 
@@ -31,68 +31,62 @@ class EventLog:
     Args:
         instance: name of the daemon's instance.
         publisher: tells subscribers.
-        report: tells in the status.
+        status: tells in the status.
         faults: where fault records lie.
         epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
 
     Attributes:
         recorder: keeps the ticks around faults.
-        latched: a fault that has to be cleared was told, and not cleared.
-        news: something was told; whoever publishes the status takes it back.
+        news: something was told since the status was published.
     """
 
     def __init__(
-        self, instance: str, publisher: Publisher, report: StatusBuilder, faults: Path, epoch_offset_ns: int
+        self, instance: str, publisher: Publisher, status: StatusBuilder, faults: Path, epoch_offset_ns: int
     ) -> None:
         self.recorder = FaultRecorder(faults)
-        self.latched = False
         self.news = False
         self._instance = instance
         self._publisher = publisher
-        self._report = report
+        self._status = status
         self._offset_ns = epoch_offset_ns
         self._metrics = MetricWatch()
         self._subscriptions = (time.monotonic(), 0)
         self._flood_due_s = 0.0
 
-    def tell(self, event: LoopEvent, config: LoadedConfig, control: LoopProcess) -> None:
+    def tell(self, event: LoopEvent, config: LoadedConfig, loop: LoopProcess) -> None:
         """Tell an event.
 
         Args:
             event: what happened.
             config: what is in force.
-            control: to which loop; the ring of a fault's ticks is its.
+            loop: to which loop; the ring of a fault's ticks is its.
         """
         level = logging.ERROR if event.is_fault else logging.WARNING if event.code >= 300 else logging.INFO
         fields = {"instance": self._instance, "code": int(event.code), "tick": event.seq}
         log.log(level, "%s", event.text, extra=fields | {"law": config.config.controller.law})
         self._publisher.event(event)
-        self._report.add_event(event)
+        self._status.add_event(event)
         self.news = True
-        if event.code == EventCode.CLEARED:
-            self.latched = False
-        elif event.is_fault and event.code != EventCode.DEVICE_LOST:
-            self.latched = True
         if event.is_fault and config.config.faults.keep:
             at_s = timestamp_s(event.deadline_ns, self._offset_ns)
-            header = receipt(event, at_s, self._instance, config, control.info)
-            self.recorder.begin(event, at_s, control.shared, config.config.loop.rate_hz, header)
+            header = receipt(event, at_s, self._instance, config, loop.info)
+            self.recorder.begin(event, at_s, loop.shared, config.config.loop.rate_hz, header)
 
     def tell_now(
-        self, code: EventCode, text: str, config: LoadedConfig, control: LoopProcess, **fields: float | int | str
+        self, code: EventCode, text: str, config: LoadedConfig, loop: LoopProcess, **fields: float | int | str
     ) -> None:
         """Tell what the supervisor itself has seen or done."""
-        seq = self._report.last.seq if self._report.last else 0
-        self.tell(LoopEvent(code, text, seq, time.monotonic_ns(), fields), config, control)
+        seq = self._status.last.seq if self._status.last else 0
+        self.tell(LoopEvent(code, text, seq, time.monotonic_ns(), fields), config, loop)
 
-    def turn(self, config: LoadedConfig, control: LoopProcess) -> None:
+    def turn(self, config: LoadedConfig, loop: LoopProcess) -> None:
         """Go on with fault records, and look at subscribers and at the driver's metrics; returns at once."""
         problem = self.recorder.turn(config.config.faults.keep)
         if problem:
-            self.tell_now(EventCode.FAULT_RECORD_FAILED, problem, config, control)
+            self.tell_now(EventCode.FAULT_RECORD_FAILED, problem, config, loop)
         now_s = time.monotonic()
-        for text, fields in self._metrics.grown(config.driver.METRICS, control.shared.metrics, now_s):
-            self.tell_now(EventCode.DEVICE_WARNING, text, config, control, **fields)
+        for text, fields in self._metrics.grown(config.driver.METRICS, loop.shared.metrics, now_s):
+            self.tell_now(EventCode.DEVICE_WARNING, text, config, loop, **fields)
         since_s, before = self._subscriptions
         if now_s - since_s < _FLOOD_WINDOW_S:
             return
@@ -101,10 +95,10 @@ class EventLog:
         if count - before > FLOOD and now_s >= self._flood_due_s:
             self._flood_due_s = now_s + _FLOOD_QUIET_S
             text = f"{count - before} subscriptions in {now_s - since_s:.1f} s"
-            self.tell_now(EventCode.SUBSCRIBER_FLOOD, text, config, control, subscriptions=count - before)
+            self.tell_now(EventCode.SUBSCRIBER_FLOOD, text, config, loop, subscriptions=count - before)
 
-    def close(self, config: LoadedConfig, control: LoopProcess, timeout_s: float) -> None:
+    def close(self, config: LoadedConfig, loop: LoopProcess, timeout_s: float) -> None:
         """Write the fault records that wait; a slow disk has so long [s]."""
         problem = self.recorder.close(config.config.faults.keep, timeout_s)
         if problem:
-            self.tell_now(EventCode.FAULT_RECORD_FAILED, problem, config, control)
+            self.tell_now(EventCode.FAULT_RECORD_FAILED, problem, config, loop)

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hapticd.config.models import MAX_WALLS
 from hapticd.faults.record import encode
 from hapticd.faults.store import FaultStore
 from hapticd.loop.memory import RECORDS, SharedMemory
@@ -141,7 +140,7 @@ class _Job(threading.Thread):
     def run(self) -> None:
         """Copy, compress, write."""
         try:
-            content = encode(self._header, self._shared.layout, self._rows(), MAX_WALLS)
+            content = encode(self._header, self._shared.layout, self._rows())
             self._store.write(self._epoch_s, self._event.code, content, self.keep)
         except OSError as error:
             self.problem = f"fault record not written: {error.filename or self._store.directory}: {error.strerror}"

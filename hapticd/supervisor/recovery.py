@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import time
-from dataclasses import replace
 from pathlib import Path
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import RECORDS
-from hapticd.loop.resume import FROM_START, ResumeState, identity
+from hapticd.loop.resume import FROM_START, ResumeState, left_by
 from hapticd.supervisor.child import LoopProcess, LoopStart
-from hapticd.tick.record import Flag, TickRecord
 
 FIRST_S = 1.0
 LONGEST_S = 30.0
@@ -33,7 +30,7 @@ class Recovery:
         lost_s: since when, on CLOCK_MONOTONIC [s].
         next_try_s: when the next try is due; of one under way, when it began [s].
         why: why the last try failed, or why the device was lost.
-        before: what the next control process goes on from.
+        resume: what the next control process goes on from.
     """
 
     def __init__(self) -> None:
@@ -41,20 +38,17 @@ class Recovery:
         self.lost_s = 0.0
         self.next_try_s = 0.0
         self.why = ""
-        self.before = FROM_START
+        self.resume = FROM_START
         self._wait_s = FIRST_S
         self._found_s = 0.0
         self._start: LoopStart | None = None
         self._arrivals = HotplugWatch()
 
-    def begin(self, control: LoopProcess, last: TickRecord, latched: bool, tared: bool, why: str) -> None:
+    def begin(self, lost: LoopProcess, why: str) -> None:
         """Look for a device that has just been lost.
 
         Args:
-            control: the process that lost it and is about to end.
-            last: the last tick that was fetched, of that process or of one before it.
-            latched: a fault is not cleared.
-            tared: walls stand where they will not stand for the next process, so nobody arms by himself.
+            lost: the process that lost it and is about to end; it has left what the next one goes on from.
             why: how it was lost.
         """
         now_s = time.monotonic()
@@ -63,17 +57,7 @@ class Recovery:
         self.lost = True
         self.lost_s = now_s
         self._arrivals = HotplugWatch()
-        if control.shared.words[RECORDS]:
-            self.before = ResumeState(
-                seq=last.seq + 1,
-                skipped=control.skipped,
-                law=last.law,
-                may_arm=bool(last.flags & Flag.ARMED) and not tared,
-                latched=latched or bool(last.flags & Flag.LATCHED),
-                device=identity(control.info),
-            )
-        else:  # lost again before it ticked
-            self.before = replace(self.before, latched=latched)
+        self.resume = left_by(lost.shared, lost.info)
         self._put_off(why)
 
     def turn(self, lost: LoopProcess, config: LoadedConfig) -> LoopProcess | None:
@@ -94,7 +78,7 @@ class Recovery:
         try:
             if self._start is None:
                 if now_s >= self.next_try_s:
-                    self._start = LoopStart(config, self.before)
+                    self._start = LoopStart(config, self.resume)
                 return None
             control = self._start.poll()
             if control is None:
@@ -108,13 +92,13 @@ class Recovery:
         self._found_s = now_s
         return control
 
-    def amend(self, before: ResumeState) -> None:
+    def amend(self, resume: ResumeState) -> None:
         """Change what the next control process goes on from, also when it is already on its way.
 
         What changes nothing costs no try: who says `clear` again and again would keep the device away.
         """
-        if before != self.before:
-            self.before = before
+        if resume != self.resume:
+            self.resume = resume
             self.stop()
 
     def stop(self) -> None:

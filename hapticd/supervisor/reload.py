@@ -1,11 +1,11 @@
-"""The configuration file taken over by a running daemon: what of it may change, the letter that tells the loop."""
+"""The configuration file taken over by a running daemon: what of it may change, the request that tells the loop."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from hapticd.config.file import read
 from hapticd.config.loading import LoadedConfig, parse
@@ -14,10 +14,8 @@ from hapticd.errors import ConfigError, HapticdError
 from hapticd.keys.policy import key_ring
 from hapticd.supervisor.file_watch import FileWatcher
 from hapticd.supervisor.request_queue import Answer
+from hapticd.supervisor.state import DaemonState
 from hapticd.tick.event import EventCode
-
-if TYPE_CHECKING:
-    from hapticd.supervisor.daemon import Daemon
 
 LIVE: Final = (
     "scene",
@@ -36,11 +34,11 @@ class Reload:
     """Takes the file over, when somebody asks or, where the file says so, when it is saved; one at a time.
 
     Args:
-        service: the daemon that it is for.
+        state: the daemon.
     """
 
-    def __init__(self, service: Daemon) -> None:
-        self._service = service
+    def __init__(self, state: DaemonState) -> None:
+        self._state = state
         self._waiting: list[Answer] = []
         self._under_way = False
         self._watcher: FileWatcher | None = None
@@ -50,7 +48,7 @@ class Reload:
         """Read the file again at the next turn; a file that cannot be used changes nothing.
 
         Args:
-            answer: told "" when the file is in force, else why it is not; without one nobody is.
+            answer: told "" when the file is in force, else why it is not.
         """
         self._waiting.append(answer)
 
@@ -62,13 +60,13 @@ class Reload:
         if self._waiting:
             answers, self._waiting = self._waiting, []
             try:
-                path = self._service.config.path
+                path = self._state.config.path
                 self._begin(parse(read(path, files_only=True), str(path)), answers)
             except HapticdError as error:
                 self._refuse(str(error), answers)
         elif isinstance(saved, ConfigError):
             self._refuse(str(saved), [])
-        elif saved is not None and saved.text != self._service.config.text:
+        elif saved is not None and saved.text != self._state.config.text:
             self._begin(saved, [])
 
     def close(self) -> None:
@@ -78,9 +76,9 @@ class Reload:
             self._watcher.wait_closed()
 
     def _begin(self, wanted: LoadedConfig, answers: list[Answer]) -> None:
-        service = self._service
-        service.notifier.send("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
-        problems = [*needs_restart(service.config, wanted)]
+        state = self._state
+        state.notifier.send("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
+        problems = [*needs_restart(state.config, wanted)]
         try:
             ring = key_ring(wanted)
         except HapticdError as error:
@@ -94,36 +92,36 @@ class Reload:
             if verdict:
                 self._refuse(f"{wanted.path}: {verdict}", answers)
                 return
-            service.adopt(wanted, ring)
+            state.adopt(wanted, ring)
             self._follow()
-            service.notifier.send("READY=1")
+            state.notifier.send("READY=1")
             for answer in answers:
                 answer("")
 
         self._under_way = True
-        if service.recovery.lost:
-            before = service.recovery.before
-            other_law = not same_law(service.config, wanted)
-            service.recovery.amend(replace(before, law=before.law + other_law))
+        if state.recovery.lost:
+            resume = state.recovery.resume
+            other_law = not same_law(state.config, wanted)
+            state.recovery.amend(replace(resume, law=resume.law + other_law))
             text = f"configuration {wanted.hash}: in force when the device is back"
-            service.event_log.tell_now(EventCode.SWITCHED, text, service.config, service.control)
+            state.tell(EventCode.SWITCHED, text)
             finish("")
         else:
-            service.requests.submit(switch_letter(service.config, wanted), finish)
+            state.requests.submit(switch_request(state.config, wanted), finish)
 
     def _refuse(self, why: str, answers: list[Answer]) -> None:
-        service = self._service
+        state = self._state
         text = f"configuration refused, nothing changed: {why}"
-        service.event_log.tell_now(EventCode.REFUSED, text, service.config, service.control)
-        service.notifier.send("READY=1")
+        state.tell(EventCode.REFUSED, text)
+        state.notifier.send("READY=1")
         for answer in answers:
             answer(why)
 
     def _follow(self) -> None:
         """Look at the file, or not, as it says itself."""
-        wanted = self._service.config.config.service.reload_on_save
+        wanted = self._state.config.config.service.reload_on_save
         if wanted and self._watcher is None:
-            self._watcher = FileWatcher(self._service.config.path, self._service.config.text)
+            self._watcher = FileWatcher(self._state.config.path, self._state.config.text)
         elif self._watcher is not None and not wanted:
             self._watcher.close()
             self._watcher = None
@@ -142,7 +140,7 @@ def same_law(now: LoadedConfig, wanted: LoadedConfig) -> bool:
     return now.config.controller.law == wanted.config.controller.law and now.params == wanted.params
 
 
-def switch_letter(now: LoadedConfig, wanted: LoadedConfig) -> dict[str, Any]:
+def switch_request(now: LoadedConfig, wanted: LoadedConfig) -> dict[str, Any]:
     """The request to the loop."""
     settings = wanted.config
     return {

@@ -1,4 +1,4 @@
-"""Requests to the loop, one at a time and in order: the mailbox holds a single letter. Disarming waits behind none."""
+"""Requests to the loop, one at a time and in order, since it has room for one. Disarming waits behind none."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import DISARM, DISARMED, DONE, MAIL, SharedMemory
+from hapticd.loop.memory import ANSWERED, DISARM, DISARMED, RECORDS, REQUESTS, SharedMemory
+from hapticd.loop.requests import DISARMED_SINCE
 
 MOST_WAITING = 100
 
@@ -16,7 +17,7 @@ Answer = Callable[[str], None]
 
 
 class RequestQueue:
-    """The queue in front of the loop's mailbox.
+    """The queue of requests to a loop.
 
     Args:
         shared: the memory shared with the loop.
@@ -26,68 +27,85 @@ class RequestQueue:
         self._shared = shared
         self._waiting: deque[tuple[dict[str, Any], Answer]] = deque()
         self._posted: Answer | None = None
+        self._answered_at: int | None = None
         self._calibrating = False
         self._disarming: list[Answer] = []
 
-    def submit(self, letter: dict[str, Any], answer: Answer) -> None:
-        """Queue a letter; its answer comes from a later `turn`.
+    def submit(self, request: dict[str, Any], answer: Answer) -> None:
+        """Queue a request; its answer comes from a later `turn`.
 
-        During a calibration, which takes as long as it takes, all are refused: nobody who has given up waiting is to
-        find the device armed afterwards.
+        During a calibration, which takes as long as it takes, all are refused: who has given up waiting is not to find
+        the device armed afterwards.
         """
         if self._calibrating:
             answer("the device is calibrating: wait, or call it off with `hapticd disarm`")
         elif len(self._waiting) >= MOST_WAITING:
             answer("too many requests are waiting for the loop; try again")
         else:
-            self._waiting.append((letter, answer))
+            self._waiting.append((request, answer))
 
     def disarm(self, answer: Answer) -> None:
         """Have the loop let go at its next tick; a calibration is called off, and what was to arm later does not."""
         self._shared.words[DISARM] += 1
         self._disarming.append(answer)
         waiting, self._waiting = self._waiting, deque()
-        for letter, other in waiting:
-            if letter["do"] in ("arm", "calibrate"):
-                other("disarmed meanwhile")
+        for request, other in waiting:
+            if request["do"] in ("arm", "calibrate"):
+                other(DISARMED_SINCE)
             else:
-                self._waiting.append((letter, other))
+                self._waiting.append((request, other))
 
-    def turn(self) -> None:
-        """Hand out the answers that have come, and post the next letter."""
+    def turn(self, fetched: int) -> None:
+        """Hand out the answers that have come, and send the next request.
+
+        An answer waits for the first record after it, so that the asker finds what was done in the status.
+
+        Args:
+            fetched: tick records of this loop that were fetched so far.
+        """
         words = self._shared.words
         if self._disarming and words[DISARMED] == words[DISARM]:
             answers, self._disarming = self._disarming, []
             for answer in answers:
                 answer("")
         if self._posted is not None:
-            if words[DONE] != words[MAIL]:
+            if words[ANSWERED] != words[REQUESTS]:
                 return
+            if self._answered_at is None:
+                self._answered_at = words[RECORDS]
+            if fetched <= self._answered_at:
+                return
+            self._answered_at = None
             answer, self._posted = self._posted, None
             self._calibrating = False
             answer(self._shared.verdict())
         if self._waiting:
-            letter, answer = self._waiting.popleft()
+            request, answer = self._waiting.popleft()
             try:
-                self._shared.post(letter)
+                self._shared.post(request)
             except HapticdError as error:
                 answer(str(error))
             else:
                 self._posted = answer
-                if letter["do"] == "calibrate":
+                if request["do"] == "calibrate":
                     self._calibrating = True
                     waiting, self._waiting = self._waiting, deque()
                     for other, its_answer in waiting:
                         self.submit(other, its_answer)
 
     def abandon(self, why: str) -> None:
-        """Answer all that wait: the loop is gone."""
-        answers = self._disarming + [answer for _, answer in self._waiting]
+        """Answer all that wait: the loop is gone, and so is its force, which is what disarming asks for."""
+        disarming, answers = self._disarming, [answer for _, answer in self._waiting]
         if self._posted is not None:
-            answers.insert(0, self._posted)
-        self._posted = None
+            if self._shared.words[ANSWERED] == self._shared.words[REQUESTS]:
+                self._posted(self._shared.verdict())
+            else:
+                answers.insert(0, self._posted)
+        self._posted = self._answered_at = None
         self._calibrating = False
         self._disarming = []
         self._waiting.clear()
         for answer in answers:
             answer(why)
+        for answer in disarming:
+            answer("")

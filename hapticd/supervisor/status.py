@@ -6,25 +6,22 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import hapticd
+from hapticd.config.loading import LoadedConfig
+from hapticd.config.models import SafetyConfig, WallConfig
+from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
+from hapticd.loop.resume import ResumeState
+from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.metrics import values_of
+from hapticd.supervisor.recovery import Recovery
 from hapticd.telemetry.records import LateHistogram, Status
 from hapticd.telemetry.wire import timestamp_s
 from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.flags import Flag
 from hapticd.tick.guard import limits
-from hapticd.tick.record import Flag, TickRecord
-from hapticd.tick.scene import WallTimes
-
-if TYPE_CHECKING:
-    from hapticd.config.loading import LoadedConfig
-    from hapticd.config.models import SafetyConfig
-    from hapticd.device import DeviceInfo
-    from hapticd.loop.resume import ResumeState
-    from hapticd.supervisor.child import LoopProcess
-    from hapticd.supervisor.recovery import Recovery
+from hapticd.tick.record import TickRecord
 
 _RATE_S = 0.5
 """Shortest time that a measured rate is taken over [s]."""
@@ -41,7 +38,7 @@ class StatusBuilder:
     Attributes:
         last: the newest tick, None before the first.
         rate_hz: measured lately [Hz].
-        status: as it was made last.
+        made: the status as it was made last.
     """
 
     def __init__(self, instance: str, epoch_offset_ns: int, file: Path) -> None:
@@ -49,7 +46,7 @@ class StatusBuilder:
         self._flags = 0
         self._law = 0
         self.rate_hz = 0.0
-        self.status = Status()
+        self.made = Status()
         self._instance = instance
         self._offset_ns = epoch_offset_ns
         self._file = file
@@ -61,7 +58,7 @@ class StatusBuilder:
         self._rate_from = (time.monotonic(), 0)
         self._fault: LoopEvent | None = None
         self._origin_m: dict[str, float] = {}
-        self._walls = WallTimes()
+        self._ticking = False
 
     def add(self, records: Sequence[TickRecord]) -> None:
         """Count ticks."""
@@ -72,15 +69,16 @@ class StatusBuilder:
         if records:
             self._ticks += len(records)
             self.last = records[-1]
+            self._ticking = True
             self._flags = self.last.flags
             self._law = self.last.law
 
-    def expect(self, before: ResumeState) -> None:
-        """A loop that has not ticked yet goes on from there; it does not know what the one before was tared to."""
+    def expect(self, resume: ResumeState) -> None:
+        """A loop that has not ticked yet goes on from there; where the one before was tared to is forgotten."""
         self._origin_m = {}
-        self._walls.forget()
-        self._flags = Flag.LATCHED if before.latched else 0
-        self._law = before.law
+        self._ticking = False
+        self._flags = Flag.LATCHED if resume.latched else 0
+        self._law = resume.law
 
     def add_dropped(self, ticks: int, events: int) -> None:
         """Count ticks and events that were overwritten before they were fetched."""
@@ -94,38 +92,31 @@ class StatusBuilder:
         elif event.code in (EventCode.TARED, EventCode.CALIBRATED):
             self._origin_m = {name: float(value) for name, value in event.fields.items()}
 
-    @property
-    def tared(self) -> bool:
-        """Whether positions count from elsewhere than the device does."""
-        return any(self._origin_m.values())
-
     def make(
-        self, config: LoadedConfig, control: LoopProcess, recovery: Recovery, fault_records: int, problem: str
+        self, config: LoadedConfig, loop: LoopProcess, recovery: Recovery, fault_records: int, problem: str
     ) -> Status:
         """The status as it is now.
 
         Args:
             config: what is in force.
-            control: the loop.
+            loop: the control process.
             recovery: knows whether there is a device.
             fault_records: written so far.
             problem: what stands and should be known, a line; "" when there is nothing.
         """
         self._measure_rate()
         settings = config.config
-        info = control.info
+        info = loop.info
         if recovery.lost:
-            self.expect(recovery.before)
-        seq = self.last.seq if self.last else 0
-        self._walls.take(settings.scene.walls, seq)
+            self.expect(recovery.resume)
         flags = self._flags
-        self.status = Status(
+        self.made = Status(
             version=hapticd.__version__,
             instance=self._instance,
             rate_hz=settings.loop.rate_hz,
             measured_rate_hz=self.rate_hz,
             ticks=self._ticks,
-            overruns=control.skipped,
+            overruns=loop.skipped,
             late_histogram=tuple(self._late.counts),
             late_max_us=self._late.max_us,
             busy_max_us=self._busy_max_us,
@@ -141,22 +132,22 @@ class StatusBuilder:
             device=info.model,
             serial=info.serial,
             simulated=info.simulated,
-            calibrated=not flags & Flag.UNCALIBRATED,
-            device_metrics=values_of(config.driver.METRICS, control.shared.metrics),
-            accuracy=_accuracy(control.accuracy, control.fitted_hash, config.hash),
+            calibrated=self._ticking and not flags & Flag.UNCALIBRATED,
+            device_metrics=values_of(config.driver.METRICS, loop.shared.metrics),
+            accuracy=_accuracy(loop.accuracy, loop.fitted_hash, config.hash),
             axes=info.axes,
             origin_m=tuple(self._origin_m.get(f"origin_{axis}_m", 0.0) for axis in info.axes),
             max_force_n=_largest_force_n(settings.safety, info),
             wall_axis=tuple(wall.axis for wall in settings.scene.walls),
             wall_position_m=tuple(wall.position_m for wall in settings.scene.walls),
-            wall_stiffness_n_per_m=self._walls.stiffness_n_per_m(seq, settings.loop.period_s),
+            wall_stiffness_n_per_m=self._stiffness_n_per_m(settings.scene.walls),
             config_file=str(self._file),
             config_hash=config.hash,
-            realtime=control.realtime,
+            realtime=loop.realtime,
             warnings=(
                 *((_missing(recovery),) if recovery.lost else ()),
                 *((problem,) if problem else ()),
-                *control.warnings,
+                *loop.warnings,
                 *info.notes,
             ),
             device_lost_timestamp=self._epoch_s(recovery.lost_s) if recovery.lost else 0.0,
@@ -166,7 +157,13 @@ class StatusBuilder:
             fault_timestamp=timestamp_s(self._fault.deadline_ns, self._offset_ns) if self._fault else 0.0,
             fault_records=fault_records,
         )
-        return self.status
+        return self.made
+
+    def _stiffness_n_per_m(self, walls: Sequence[WallConfig]) -> tuple[float, ...]:
+        """Stiffness of each wall as the newest tick had it; before the first one, as the file has it [N/m]."""
+        if self._ticking and self.last is not None and len(self.last.walls) == len(walls):
+            return tuple(wall.stiffness_n_per_m for wall in self.last.walls)
+        return tuple(wall.stiffness_n_per_m for wall in walls)
 
     def _measure_rate(self) -> None:
         now_s = time.monotonic()

@@ -1,25 +1,20 @@
 """What one tick records, and how a record lies in shared memory.
 
-The control process writes one record a tick; the supervisor decodes it and publishes it. A record has a fixed size
-(the slot of the ring); only the walls that the scene has are written.
+The loop writes one record a tick; the supervisor decodes it and publishes it. A record has a fixed size (the slot of
+the ring); only the walls that the scene has are written.
 """
 
 from __future__ import annotations
 
-import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from struct import Struct
+from typing import TYPE_CHECKING
 
+from hapticd.tick.flags import Flag
 
-class Flag(enum.IntFlag):
-    """State bits of a tick."""
-
-    ARMED = 1  # forces are let through
-    FALLBACK = 2  # the law failed and the damping fallback stands in for it
-    RELEASING = 4  # the force is being ramped to zero
-    LATCHED = 8  # stopped by a fault until cleared
-    LIMITED = 16  # the guard reduced the force in this tick
-    UNCALIBRATED = 32  # the device does not know where it is
+if TYPE_CHECKING:  # clients read records without the tick that makes them
+    from hapticd.device import Sample
+    from hapticd.tick.tick import ControlTick
 
 
 @dataclass(slots=True)
@@ -28,6 +23,7 @@ class WallRecord:
 
     Attributes:
         in_contact: whether the device is inside the wall.
+        stiffness_n_per_m: stiffness of the wall in this tick [N/m].
         damping_n_s_per_m: damping of the law [N s/m]; 0 when the law has none.
         felt_mass_kg: mass that the law has identified [kg]; 0 while unknown.
         cycle: number of completed cycles; the four fields below belong to the last one.
@@ -38,6 +34,7 @@ class WallRecord:
     """
 
     in_contact: bool
+    stiffness_n_per_m: float
     damping_n_s_per_m: float
     felt_mass_kg: float
     cycle: int
@@ -93,52 +90,142 @@ class TickRecord:
     walls: tuple[WallRecord, ...]
 
 
-_HEAD = "qqddd qqqq ddddd q"  # seq ... generated_j, then the number of walls
-_WALL = "qddqdddd"
-_HEAD_FIELDS = 15
-_WALL_FIELDS = 8
+_CODES = {"int": "q", "bool": "q", "float": "d"}
+_SCALARS = [field for field in fields(TickRecord) if field.type in _CODES]
+_HEAD = "".join(_CODES[str(field.type)] for field in _SCALARS) + "q"  # and the number of walls
+_WALL = "".join(_CODES[str(field.type)] for field in fields(WallRecord))
+_UNCALIBRATED = int(Flag.UNCALIBRATED)
 
 
 class RecordLayout:
     """Where the fields of a record lie, for a device with so many axes.
 
-    The writer packs scalars in the order of `TickRecord`, then the axes, the orientation and the walls.
+    First the scalars in the order of `TickRecord` and the number of walls, then the axes, the orientation and the
+    walls.
 
     Args:
         axes: translation axes of the device.
         orientation: whether the device has a wrist.
         max_walls: most walls that a record can hold.
+
+    Attributes:
+        size: of a record, whatever it holds [bytes].
+        format: of a full one, as `struct` writes it.
     """
 
     def __init__(self, axes: int, orientation: bool, max_walls: int) -> None:
         self.axes = axes
         self.orientation = orientation
         self.max_walls = max_walls
-        self._structs = [self._struct(walls) for walls in range(max_walls + 1)]
+        doubles = "d" * (4 * axes + (9 if orientation else 0))
+        self._structs = [Struct(f"<{_HEAD}{doubles}{_WALL * walls}") for walls in range(max_walls + 1)]
+        self._packs = [struct.pack_into for struct in self._structs]
         self.size = self._structs[-1].size
+        self.format = self._structs[-1].format
 
     def struct(self, walls: int) -> Struct:
-        """The packing of a record with so many walls; unused room behind it is left as it was."""
+        """How a record with this many walls is packed; it may be shorter than `size`."""
         return self._structs[walls]
+
+    def pack(
+        self,
+        area: memoryview,
+        at: int,
+        tick: ControlTick,
+        sample: Sample,
+        seq: int,
+        deadline_ns: int,
+        late_us: float,
+        busy_us: float,
+        skipped: int,
+        law: int,
+    ) -> None:
+        """Record a tick that is done; room behind a record with fewer walls is left as it was.
+
+        Args:
+            area: where to.
+            at: offset of the record in it [bytes].
+            tick: what was done.
+            sample: what the device said.
+            seq: tick number.
+            deadline_ns: when it was due [ns of CLOCK_MONOTONIC].
+            late_us: how late it started [us].
+            busy_us: how long its body took [us].
+            skipped: deadlines skipped so far.
+            law: index of the law activation.
+        """
+        motion = tick.motion
+        past = tick.past
+        energy_j = past.energy_j
+        stored_j = past.stored_j
+        dissipated_j = past.dissipated_j
+        generated_j = past.generated_j
+        walls: list[float] = []
+        for contact in tick.contacts:
+            ledger = contact.ledger
+            energy_j += ledger.energy_j
+            stored_j += ledger.stored_j
+            dissipated_j += ledger.dissipated_j
+            generated_j += ledger.generated_j
+            walls += (
+                contact.in_contact,
+                contact.wall.stiffness_n_per_m,
+                contact.damping_n_s_per_m,
+                contact.felt_mass_kg,
+                ledger.cycle,
+                ledger.cycle_energy_j,
+                ledger.cycle_generated_j,
+                ledger.cycle_damping_n_s_per_m,
+                ledger.cycle_duration_s,
+            )
+        for contact in tick.leaving:
+            ledger = contact.ledger
+            energy_j += ledger.energy_j
+            stored_j += ledger.stored_j
+            dissipated_j += ledger.dissipated_j
+            generated_j += ledger.generated_j
+        count = len(tick.contacts)
+        self._packs[count](
+            area,
+            at,
+            seq,
+            deadline_ns,
+            late_us,
+            busy_us,
+            motion.dt_s,
+            skipped,
+            tick.flags if sample.calibrated else tick.flags | _UNCALIBRATED,
+            law,
+            sample.buttons,
+            sample.gripper_m,
+            energy_j,
+            stored_j,
+            dissipated_j,
+            generated_j,
+            count,
+            *motion.position_m,
+            *motion.velocity_m_per_s,
+            *tick.force_n,
+            *tick.requested_n,
+            *(sample.orientation if self.orientation else ()),
+            *walls,
+        )
 
     def unpack(self, row: bytes | memoryview) -> TickRecord:
         """Decode one record."""
-        walls = int.from_bytes(row[(_HEAD_FIELDS - 1) * 8 : _HEAD_FIELDS * 8], "little")
+        scalars = len(_SCALARS)
+        walls = int.from_bytes(row[scalars * 8 : (scalars + 1) * 8], "little")
         values = self._structs[walls].unpack_from(row)
-        at = _HEAD_FIELDS
+        at = scalars + 1
         vectors: list[tuple[float, ...]] = []
         for length in (self.axes, self.axes, self.axes, self.axes, 9 if self.orientation else 0):
             vectors.append(values[at : at + length])
             at += length
         wall_records = []
         for _ in range(walls):
-            wall = WallRecord(*values[at : at + _WALL_FIELDS])
+            wall = WallRecord(*values[at : at + len(_WALL)])
             wall.in_contact = bool(wall.in_contact)
             wall_records.append(wall)
-            at += _WALL_FIELDS
-        fields = (*values[: _HEAD_FIELDS - 1], *vectors, tuple(wall_records))
-        return TickRecord(*fields)
-
-    def _struct(self, walls: int) -> Struct:
-        doubles = 4 * self.axes + (9 if self.orientation else 0)
-        return Struct("<" + _HEAD.replace(" ", "") + "d" * doubles + _WALL * walls)
+            at += len(_WALL)
+        made = (*values[:scalars], *vectors, tuple(wall_records))
+        return TickRecord(*made)

@@ -14,9 +14,9 @@ from hapticd.tick import fallback
 from hapticd.tick.contact import Contact, RunningLaw, heirs
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.event import EventCode
+from hapticd.tick.flags import Flag
 from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, limits
 from hapticd.tick.motion import Motion
-from hapticd.tick.record import Flag
 from hapticd.tick.scene import Wall, compile_walls
 
 FROZEN_TICKS = 20

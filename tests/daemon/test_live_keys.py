@@ -12,7 +12,7 @@ from hapticd.config.loading import parse
 from hapticd.config.models import Config
 from hapticd.config.problems import tables_of
 from hapticd.settings import Table
-from hapticd.supervisor.reload import needs_restart, switch_letter
+from hapticd.supervisor.reload import needs_restart, switch_request
 from hapticd.tick.guard import Guard
 from tests.daemon.running import Daemon, Subscriber
 from tests.daemon.test_switching import Asker
@@ -85,7 +85,7 @@ LOOP: dict[str, tuple[str, Callable[[Bench], object], object]] = {
     "safety.ramp_s": (WALL + "[safety]\nramp_s = 0.1\n", lambda bench: bench.tick.ramp_ticks, 100),
     "safety.supervisor_stall_s": (
         WALL + "[safety]\nsupervisor_stall_s = 3.0\n",
-        lambda bench: bench.loop.stall_ns,
+        lambda bench: bench.loop.session.stall_ns,
         3_000_000_000,
     ),
 }
@@ -150,7 +150,7 @@ def test_the_loop_takes_it_over(key: str) -> None:
     assert shown(bench) != expected
     wanted = parse(DEVICE + text, "lab.toml")
     assert not list(needs_restart(start, wanted))
-    assert bench.ask(**switch_letter(start, wanted)) == ""
+    assert bench.ask(**switch_request(start, wanted)) == ""
     assert shown(bench) == expected
     bench.close()
 

@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 
 from hapticd.errors import DeviceNotFoundError
+from hapticd.simulation.options import SimulationOptions
 from hapticd.supervisor import recovery
 from hapticd.supervisor.recovery import LONGEST_S, SETTLE_S, HotplugWatch, Recovery
+from hapticd_drivers.loopback import Loopback
 
 
 @pytest.fixture
@@ -59,10 +61,11 @@ def test_a_device_that_has_been_away_for_long_is_tried_when_something_is_plugged
     bus: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recovery, "LoopStart", Absent)
-    lost: Any = SimpleNamespace(exit_code=0, shared=SimpleNamespace(words=[0]))
+    info = Loopback(SimulationOptions(), 1e-3).open()
+    lost: Any = SimpleNamespace(exit_code=0, shared=SimpleNamespace(words=[0] * 13), info=info)
     looking = Recovery()
     nothing: Any = None
-    looking.begin(lost, nothing, False, False, "unplugged")
+    looking.begin(lost, "unplugged")
     for _ in range(8):  # time after time in vain
         looking.next_try_s = 0.0
         looking.turn(lost, nothing)

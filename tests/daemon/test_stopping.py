@@ -65,8 +65,8 @@ def test_a_loop_that_has_to_be_killed_at_the_end_leaves_no_force_behind(
 ) -> None:
     """Whatever the daemon ends for, such as an error of its own."""
     monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
-    service = supervising.Daemon(parse('[loop]\nrealtime = "off"\n', "lab.toml"), "default")
-    service.control.process.send_signal(signal.SIGSTOP)
-    service._undo.close()
-    assert service.control.exit_code == -signal.SIGKILL
+    daemon = supervising.Daemon(parse('[loop]\nrealtime = "off"\n', "lab.toml"), "default")
+    daemon.state.loop.process.send_signal(signal.SIGSTOP)
+    daemon._undo.close()
+    assert daemon.state.loop.exit_code == -signal.SIGKILL
     assert "was killed; the device is without force" in caplog.text

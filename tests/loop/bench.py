@@ -1,4 +1,4 @@
-"""A control loop on a bench, without its clock: letters are worked off as between the ticks of a running one."""
+"""A control loop on a bench, without its clock: requests are worked off as between the ticks of a running one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import DISARM, DISARMED, DONE, MAIL, EventReader, SharedMemory
+from hapticd.loop.memory import ANSWERED, DISARM, DISARMED, REQUESTS, EventReader, SharedMemory
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.guard import Mode
@@ -43,13 +43,13 @@ class Bench:
                 self.driver.write(force_n)
         return self.tick
 
-    def ask(self, **letter: Any) -> str:
-        """The verdict, once the letter is worked off, a slice a tick."""
-        if letter["do"] == "disarm":
+    def ask(self, **request: Any) -> str:
+        """The verdict, once the request is worked off, a slice a tick."""
+        if request["do"] == "disarm":
             self.shared.words[DISARM] += 1
-            self.loop.requests.disarm()
+            self.loop.session.disarm()
             return "" if self.shared.words[DISARMED] == self.shared.words[DISARM] else "still armed"
-        self.shared.post(letter)
+        self.shared.post(request)
         while not self.answered:
             self.ticks(1)
             self.loop.requests.work()
@@ -57,8 +57,8 @@ class Bench:
 
     @property
     def answered(self) -> bool:
-        """Whether no letter waits for its verdict."""
-        return self.shared.words[MAIL] == self.shared.words[DONE]
+        """Whether no request waits for its verdict."""
+        return self.shared.words[REQUESTS] == self.shared.words[ANSWERED]
 
     def close(self) -> None:
         self.loop.requests.worker.end()

@@ -9,7 +9,7 @@ import pytest
 
 from hapticd.config.loading import parse
 from hapticd.errors import DeviceTimeoutError, DriverStateError
-from hapticd.loop.memory import DISARM, DISARMED, SharedMemory
+from hapticd.loop.memory import DISARM, DISARMED, RECORDS, SharedMemory
 from hapticd.supervisor.request_queue import Answer, RequestQueue
 from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
@@ -41,6 +41,13 @@ def loop_answers(shared: SharedMemory, verdict: str = "") -> None:
     shared.answer(verdict)
 
 
+def turn(requests: RequestQueue, shared: SharedMemory) -> None:
+    """A turn of the supervisor, another one once the loop has ticked again."""
+    requests.turn(shared.words[RECORDS])
+    shared.words[RECORDS] += 1
+    requests.turn(shared.words[RECORDS])
+
+
 def loop_disarms(shared: SharedMemory) -> None:
     shared.words[DISARMED] = shared.words[DISARM]
 
@@ -49,48 +56,73 @@ class TestInTheQueue:
     def test_disarming_overtakes_a_request_that_is_being_worked_off(self, shared: SharedMemory) -> None:
         requests, answers = RequestQueue(shared), Answers()
         requests.submit({"do": "switch"}, answers.to("switch"))
-        requests.turn()
+        turn(requests, shared)
         requests.disarm(answers.to("disarm"))
-        requests.turn()
+        turn(requests, shared)
         assert answers == []
         loop_disarms(shared)
-        requests.turn()
+        turn(requests, shared)
         assert answers == ["disarm: done"]
 
     def test_what_waits_to_arm_does_not_after_somebody_disarmed(self, shared: SharedMemory) -> None:
         requests, answers = RequestQueue(shared), Answers()
         requests.submit({"do": "switch"}, answers.to("switch"))
-        requests.turn()
+        turn(requests, shared)
         for do in ("arm", "calibrate", "clear"):
             requests.submit({"do": do}, answers.to(do))
         requests.disarm(answers.to("disarm"))
         loop_disarms(shared)
         loop_answers(shared)
-        requests.turn()
-        assert answers == ["arm: disarmed meanwhile", "calibrate: disarmed meanwhile", "disarm: done", "switch: done"]
-        assert shared.letter() == {"do": "clear"}
+        turn(requests, shared)
+        assert answers == [
+            "arm: not done: disarming was asked for after it",
+            "calibrate: not done: disarming was asked for after it",
+            "disarm: done",
+            "switch: done",
+        ]
+        assert shared.request()["do"] == "clear"
 
     def test_during_a_calibration_all_is_refused_at_once_and_nothing_arms_later(self, shared: SharedMemory) -> None:
         requests, answers = RequestQueue(shared), Answers()
         requests.submit({"do": "calibrate"}, answers.to("calibrate"))
         requests.submit({"do": "arm"}, answers.to("early arm"))
-        requests.turn()
+        turn(requests, shared)
         requests.submit({"do": "switch"}, answers.to("switch"))
         assert [answer.partition(" the device is calibrating")[0] for answer in answers] == ["early arm:", "switch:"]
         loop_answers(shared)
-        requests.turn()
+        turn(requests, shared)
         requests.submit({"do": "arm"}, answers.to("arm"))
-        requests.turn()
+        turn(requests, shared)
         assert answers[2:] == ["calibrate: done"]
-        assert shared.letter() == {"do": "arm"}
+        assert shared.request()["do"] == "arm"
 
     def test_a_loop_that_is_gone_answers_all(self, shared: SharedMemory) -> None:
         requests, answers = RequestQueue(shared), Answers()
         requests.submit({"do": "calibrate"}, answers.to("calibrate"))
-        requests.turn()
+        turn(requests, shared)
         requests.disarm(answers.to("disarm"))
         requests.abandon("gone")
-        assert sorted(answers) == ["calibrate: gone", "disarm: gone"]
+        assert sorted(answers) == ["calibrate: gone", "disarm: done"], "there is no force any more"
+
+    def test_what_a_lost_loop_had_done_before_is_told_as_it_was(self, shared: SharedMemory) -> None:
+        requests, answers = RequestQueue(shared), Answers()
+        requests.submit({"do": "clear"}, answers.to("clear"))
+        requests.turn(0)
+        loop_answers(shared)
+        requests.abandon("gone")
+        assert answers == ["clear: done"]
+
+    def test_an_answer_comes_after_the_first_record_that_shows_what_was_done(self, shared: SharedMemory) -> None:
+        requests, answers = RequestQueue(shared), Answers()
+        requests.submit({"do": "switch"}, answers.to("switch"))
+        shared.words[RECORDS] = 7
+        requests.turn(7)
+        loop_answers(shared)
+        requests.turn(7)
+        requests.turn(7)
+        assert answers == []
+        requests.turn(8)
+        assert answers == ["switch: done"]
 
 
 class TestInTheLoop:
@@ -103,13 +135,13 @@ class TestInTheLoop:
 
         monkeypatch.setattr(bench.driver, "_calibrate", calibrate)
         monkeypatch.setattr(bench.driver, "_call_off", stopped.set)
-        letters = bench.loop.requests
+        requests = bench.loop.requests
         bench.shared.post({"do": "calibrate"})
-        letters.work()
+        requests.work()
         assert bench.ask(do="disarm") == ""
         while not bench.answered:
             bench.ticks(1)
-            letters.work()
+            requests.work()
         assert bench.shared.verdict() == "the calibration was called off"
         assert "called off" in bench.told()[EventCode.CALIBRATION_ENDED].text
 

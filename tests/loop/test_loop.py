@@ -11,7 +11,7 @@ from hapticd.config.loading import parse
 from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverOptions
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import DISARM, DONE, MAIL, SUPERVISOR_BEAT, EventReader, SharedMemory
+from hapticd.loop.memory import ANSWERED, DISARM, REQUESTS, SUPERVISOR_BEAT, EventReader, SharedMemory
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
@@ -90,9 +90,9 @@ def test_the_last_force_that_a_device_is_told_is_zero(run: Run, shared: SharedMe
         if number == 100 and how == "disarmed":
             shared.words[DISARM] += 1
         elif number == 100 and how == "after a fault":
-            loop.tick.fail(EventCode.OVER_SPEED, "too fast")
+            loop.session.tick.fail(EventCode.OVER_SPEED, "too fast")
         elif number == 200:
-            loop.stop_requested = True
+            loop.session.stop_requested = True
 
     told = run(RELEASED_FAST, each_tick).told
     assert max(force_n for force_n in told if isinstance(force_n, float)) == pytest.approx(5.0)
@@ -111,17 +111,17 @@ def test_the_time_that_a_request_takes_is_not_the_laws(
             while time.thread_time_ns() < end_ns:
                 pass
             if next(slices) == 9:
-                shared.words[DONE] = shared.words[MAIL]
+                shared.words[ANSWERED] = shared.words[REQUESTS]
 
         if number == 20:
             monkeypatch.setattr(loop.requests, "work", work)
-            shared.words[MAIL] += 1
-        loop.stop_requested = number == 100
+            shared.words[REQUESTS] += 1
+        loop.session.stop_requested = number == 100
 
     events = EventReader(shared)
     run("", each_tick)
     codes = [event.code for event in events.read()]
-    assert shared.words[DONE] == shared.words[MAIL] == 1
+    assert shared.words[ANSWERED] == shared.words[REQUESTS] == 1
     assert EventCode.LAW_OVER_BUDGET not in codes
     assert codes[0] == EventCode.STARTED
 
@@ -130,10 +130,10 @@ def test_disarming_waits_behind_no_request(run: Run, shared: SharedMemory, monke
     def each_tick(loop: ControlLoop, number: int) -> None:
         if number == 20:
             monkeypatch.setattr(loop.requests, "work", lambda: None)  # one that takes for ever
-            shared.words[MAIL] += 1
+            shared.words[REQUESTS] += 1
         elif number == 40:
             shared.words[DISARM] += 1
-        loop.stop_requested = number == 1000
+        loop.session.stop_requested = number == 1000
 
     told = run("", each_tick).told
     assert told.index("disable") < 200

@@ -14,7 +14,7 @@ import pytest
 from hapticd.config.models import MAX_WALLS
 from hapticd.device import Metric
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import DONE, EVENTS, MAIL, RECORDS, EventReader, RecordReader, SharedMemory
+from hapticd.loop.memory import ANSWERED, DISARM, EVENTS, RECORDS, REQUESTS, EventReader, RecordReader, SharedMemory
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.record import RecordLayout, TickRecord
 from hapticd_drivers.loopback import Loopback
@@ -37,7 +37,7 @@ def write(shared: SharedMemory, count: int) -> None:
         walls = number % (MAX_WALLS + 1)
         scalars = [number] * 14 + [walls] + [number] * 12
         row = LAYOUT.struct(walls)
-        row.pack_into(shared.record_area, number % shared.slots * LAYOUT.size, *scalars, *[number] * (8 * walls))
+        row.pack_into(shared.record_area, number % shared.slots * LAYOUT.size, *scalars, *[number] * (9 * walls))
         shared.words[RECORDS] = number + 1
 
 
@@ -214,12 +214,14 @@ def test_fields_that_do_not_fit_are_left_out_and_the_text_stays(shared: SharedMe
 
 
 def test_a_letter_is_read_answered_and_its_verdict_read(shared: SharedMemory) -> None:
-    number = shared.post({"do": "switch", "params": {"window": 2}, "scene": {"walls": [{"at": 1.5}]}})
-    assert number == shared.words[MAIL] == 1
-    assert shared.words[DONE] == 0
-    assert shared.letter() == {"do": "switch", "params": {"window": 2}, "scene": {"walls": [{"at": 1.5}]}}
+    shared.words[DISARM] = 3
+    shared.post({"do": "switch", "params": {"window": 2}, "scene": {"walls": [{"at": 1.5}]}})
+    assert shared.words[REQUESTS] == 1
+    assert shared.words[ANSWERED] == 0
+    asked = {"do": "switch", "params": {"window": 2}, "scene": {"walls": [{"at": 1.5}]}, "disarm": 3}
+    assert shared.request() == asked
     shared.answer("")
-    assert shared.words[DONE] == 1
+    assert shared.words[ANSWERED] == 1
     assert shared.verdict() == ""
 
 
@@ -227,18 +229,18 @@ def test_a_second_letter_waits_for_the_answer_to_the_first(shared: SharedMemory)
     shared.post({"do": "arm"})
     with pytest.raises(HapticdError, match="still busy"):
         shared.post({"do": "clear"})
-    assert shared.letter() == {"do": "arm"}
+    assert shared.request()["do"] == "arm"
     shared.answer("no")
     shared.post({"do": "clear"})
-    assert shared.letter() == {"do": "clear"}
+    assert shared.request()["do"] == "clear"
 
 
 def test_a_letter_that_is_too_long_is_refused_and_the_box_stays_free(shared: SharedMemory) -> None:
     with pytest.raises(HapticdError, match="bytes long"):
         shared.post({"do": "switch", "params": "x" * (1 << 18)})
-    assert shared.words[MAIL] == 0
+    assert shared.words[REQUESTS] == 0
     shared.post({"do": "switch", "params": "x" * ((1 << 18) - 100)})
-    assert len(shared.letter()["params"]) == (1 << 18) - 100
+    assert len(shared.request()["params"]) == (1 << 18) - 100
 
 
 @pytest.mark.parametrize("verdict", ["", "law gone", "ä" * 5000, "🙂" * 3000])
@@ -254,7 +256,7 @@ def test_both_sides_of_a_descriptor_see_the_same_memory(shared: SharedMemory) ->
     shared.post({"do": "arm"})
     other.write_event(event(5, "seen"))
     assert [record.seq for record in RecordReader(other).read()] == [0, 1, 2]
-    assert other.letter() == {"do": "arm"}
+    assert other.request()["do"] == "arm"
     assert [each.text for each in EventReader(shared).read()] == ["seen"]
     other.close()
 

@@ -11,7 +11,7 @@ import pytest
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.device import Sample
-from hapticd.supervisor.reload import switch_letter
+from hapticd.supervisor.reload import switch_request
 from hapticd.tick.event import EventCode
 from tests.loop.bench import PERIOD_S, Bench
 
@@ -71,7 +71,7 @@ def test_a_tared_scene_is_kept_through_a_switch_and_felt_where_it_is(bench: Benc
     bench.ticks(1)
     bench.ask(do="tare")
     wanted = configured(WALLS.replace("12000.0", "9000.0"))
-    assert bench.ask(**switch_letter(START, wanted)) == ""
+    assert bench.ask(**switch_request(START, wanted)) == ""
     assert bench.tick.motion.origin_m == pytest.approx([0.02])
     assert bench.ask(do="arm") == ""
     bench.ticks(1)
@@ -92,26 +92,31 @@ def test_a_calibration_forgets_the_origin_since_the_device_may_count_from_elsewh
 
 def test_a_switch_that_is_refused_leaves_law_scene_and_limits_as_they_were(bench: Bench) -> None:
     bench.ticks(1)
-    letter = switch_letter(START, configured("[controller]\nlaw = 'tdpa'\n[safety]\nramp_s = 0.2\n"))
-    letter["safety"]["max_force_n"] = 50.0
-    before = (bench.tick.contacts[0].law, bench.tick.contacts[0].wall, bench.tick.ramp_s, bench.loop.law_count)
-    assert "takes at most 12 N" in bench.ask(**letter)
-    assert (bench.tick.contacts[0].law, bench.tick.contacts[0].wall, bench.tick.ramp_s, bench.loop.law_count) == before
+    request = switch_request(START, configured("[controller]\nlaw = 'tdpa'\n[safety]\nramp_s = 0.2\n"))
+    request["safety"]["max_force_n"] = 50.0
+    before = (bench.tick.contacts[0].law, bench.tick.contacts[0].wall, bench.tick.ramp_s, bench.loop.session.law_count)
+    assert "takes at most 12 N" in bench.ask(**request)
+    assert (
+        bench.tick.contacts[0].law,
+        bench.tick.contacts[0].wall,
+        bench.tick.ramp_s,
+        bench.loop.session.law_count,
+    ) == before
     assert EventCode.SWITCHED not in bench.told()
 
 
 def test_what_means_the_same_goes_on_with_what_the_law_has_learnt(bench: Bench) -> None:
     """A default that is now written out is no other law."""
     law = bench.tick.contacts[0].law
-    assert bench.ask(**switch_letter(START, configured(WALLS + "[controller.params]\nwindow = 2\n"))) == ""
+    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nwindow = 2\n"))) == ""
     assert bench.tick.contacts[0].law is law
-    assert bench.ask(**switch_letter(START, configured(WALLS + "[controller.params]\nwindow = 3\n"))) == ""
+    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nwindow = 3\n"))) == ""
     assert bench.tick.contacts[0].law is not law
 
 
 def test_each_wall_has_a_law_of_its_own(bench: Bench) -> None:
     wanted = configured(WALLS + WALLS.replace("12000.0", "1000.0") + "[controller]\nlaw = 'tdpa'\n")
-    assert bench.ask(**switch_letter(START, wanted)) == ""
+    assert bench.ask(**switch_request(START, wanted)) == ""
     one, two = (contact.law for contact in bench.tick.contacts)
     assert one.module is two.module
     assert one.state is not two.state
@@ -120,11 +125,11 @@ def test_each_wall_has_a_law_of_its_own(bench: Bench) -> None:
 
 def test_nothing_that_is_asked_leaves_a_cycle_for_the_collector_which_is_off_in_the_loop(bench: Bench) -> None:
     good = [
-        switch_letter(START, configured(f"{walls}[controller]\nlaw = '{law}'\n"))
+        switch_request(START, configured(f"{walls}[controller]\nlaw = '{law}'\n"))
         for law in ("none", "tdpa", "energy-cycle")
         for walls in ("", WALLS, WALLS + WALLS.replace("12000.0", "1000.0\nposition_m = 0.1"))
     ]
-    letters: list[dict[str, Any]] = [
+    requests: list[dict[str, Any]] = [
         *good,
         {**good[0], "scene": {"walls": [{"axis": "z"}]}},
         {**good[0], "params": {"window": "x"}},
@@ -134,15 +139,15 @@ def test_nothing_that_is_asked_leaves_a_cycle_for_the_collector_which_is_off_in_
         *({"do": do} for do in ("tare", "arm", "tare", "calibrate", "disarm", "clear")),
     ]
     bench.ticks(1)
-    for letter in letters:  # what is made once is made now
-        bench.ask(**letter)
+    for request in requests:  # what is made once is made now
+        bench.ask(**request)
     found = []
     gc.disable()
     try:
         for _ in range(3):  # a thread of another test may end meanwhile, but only once
             gc.collect()
-            for letter in letters:
-                bench.ask(**letter)
+            for request in requests:
+                bench.ask(**request)
             found.append(gc.collect())
     finally:
         gc.enable()

@@ -34,7 +34,7 @@ class Contact:
 
 def completed(cycles: Cycles, *contacts: Contact) -> list[tuple[int, int]]:
     record = ticks(1)[0]
-    record.walls = tuple(WallRecord(True, 0.0, 0.0, one.cycle, one.energy_j, 0.0, 5.0, 0.1) for one in contacts)
+    record.walls = tuple(WallRecord(True, 0.0, 0.0, 0.0, one.cycle, one.energy_j, 0.0, 5.0, 0.1) for one in contacts)
     return list(cycles.completed(record))
 
 

@@ -169,7 +169,7 @@ def test_timestamps_are_the_clocks_and_never_step_back() -> None:
 
 
 def wall(cycle: int, energy_j: float = 0.0) -> WallRecord:
-    return WallRecord(True, 0.0, 0.0, cycle, energy_j, 0.0, 0.0, 0.0)
+    return WallRecord(True, 0.0, 0.0, 0.0, cycle, energy_j, 0.0, 0.0, 0.0)
 
 
 def test_every_completed_cycle_is_told_once_by_wall() -> None:

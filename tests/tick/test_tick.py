@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
 from hapticd.tick.event import EventCode
-from hapticd.tick.record import Flag
+from hapticd.tick.flags import Flag
 from hapticd_controllers import energy_cycle, none, tdpa
 from tests.tick.rig import LIMIT_N, PERIOD_S, Rig, running, wall
 from tests.tick.transitions import pressed

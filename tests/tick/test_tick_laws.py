@@ -13,8 +13,8 @@ import pytest
 from hapticd.config.models import SafetyConfig
 from hapticd.errors import PluginError
 from hapticd.tick.event import EventCode
+from hapticd.tick.flags import Flag
 from hapticd.tick.guard import Mode
-from hapticd.tick.record import Flag
 from tests.tick.rig import LIMIT_N, RAMP_TICKS, Rig, largest_step, law, returns, running, scene, wall
 from tests.tick.transitions import pressed
 

@@ -78,7 +78,7 @@ def run_loop(
             (driver, "read", "read"),
             (driver, "write", "write"),
             (tick, "step", "step"),
-            (control, "_record", "record"),
+            (shared.layout, "pack", "record"),
         ):
             if pieces:
                 setattr(owner, method, timed(getattr(owner, method), pieces[name]))

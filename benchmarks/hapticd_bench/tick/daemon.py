@@ -148,11 +148,11 @@ def serve_daemon(connection: Connection, text: str, heavy: bool) -> None:
     with tempfile.TemporaryDirectory(prefix="hapticd-bench-") as runtime:
         os.environ["HAPTICD_RUNTIME_DIR"] = runtime
         try:
-            service = Daemon(parse(text, "benchmark"), "bench")
-            kept = KeptRecords(service.control.shared, heavy)
-            service.control.reader = kept
+            daemon = Daemon(parse(text, "benchmark"), "bench")
+            kept = KeptRecords(daemon.state.loop.shared, heavy)
+            daemon.state.loop.reader = kept
             threading.Thread(target=_tell_start, args=(connection, kept.started), daemon=True).start()
-            read_events = service.control.events.read
+            read_events = daemon.state.loop.events.read
 
             def watched() -> Any:
                 events = read_events()
@@ -161,9 +161,9 @@ def serve_daemon(connection: Connection, text: str, heavy: bool) -> None:
                         kept.ticks.fault = event.text
                 return events
 
-            vars(service.control.events)["read"] = watched
-            kept.ticks.warnings = tuple(service.control.warnings)
-            exit_code = service.run()
+            vars(daemon.state.loop.events)["read"] = watched
+            kept.ticks.warnings = tuple(daemon.state.loop.warnings)
+            exit_code = daemon.run()
             kept.ticks.dropped = kept.dropped
             if exit_code and not kept.ticks.fault:
                 kept.ticks.fault = f"the daemon ended with exit code {exit_code}"

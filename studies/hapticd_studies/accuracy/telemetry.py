@@ -73,7 +73,7 @@ def _cpu_s(loaded: LoadedConfig, size: int) -> float:
         update={"batch_ticks": size, "tcp": None, "ipc": True, "every_ticks": 1}
     )
     period_ns = loaded.config.loop.period_ns
-    walls = tuple(WallRecord(True, 18.9, 0.25, 0, 0.0, 0.0, 0.0, 0.0) for _ in loaded.config.scene.walls)
+    walls = tuple(WallRecord(True, 12e3, 18.9, 0.25, 0, 0.0, 0.0, 0.0, 0.0) for _ in loaded.config.scene.walls)
     tick = TickRecord(
         seq=0, deadline_ns=0, late_us=12.5, busy_us=21.25, dt_s=period_ns * 1e-9, skipped=0, flags=1, law=0, buttons=0,
         gripper_m=0.0, energy_j=1.25e-3, spring_energy_j=3.5e-4, dissipated_j=9.25e-4, generated_j=2.5e-5,

@@ -43,7 +43,7 @@ class DeviceTime:
         self.now_ns = deadline_ns
         self.ticks += 1
         if self.loop is not None and self.ticks > self._stop_after:
-            self.loop.stop_requested = True
+            self.loop.session.stop_requested = True
         return deadline_ns
 
 

@@ -1,0 +1,112 @@
+"""What the loop and the requests that change it have in common: the device, the tick, the counts, the events."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from hapticd.driver import Driver
+from hapticd.errors import DriverError
+from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED, SharedMemory
+from hapticd.loop.resume import ResumeState
+from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.guard import Mode
+from hapticd.tick.tick import ControlTick
+
+
+class Session:
+    """One loop on one device, from its first tick to its last.
+
+    Args:
+        driver: an open driver.
+        tick: what happens between sample and force.
+        shared: the memory shared with the supervisor.
+        stall_s: how long the supervisor may be silent [s].
+        resume: where the loop before stopped, when this one goes on for it.
+
+    Attributes:
+        seq: number of the tick under way.
+        skipped: deadlines skipped so far.
+        law_count: index of the law activation, counted up at each switch.
+        deadline_ns: when the tick under way was due [ns of CLOCK_MONOTONIC]; 0 before the first.
+        stall_ns: how long the supervisor may be silent [ns].
+        stop_requested: the force is to be ramped to zero and the loop to end.
+    """
+
+    def __init__(
+        self, driver: Driver[Any], tick: ControlTick, shared: SharedMemory, stall_s: float, resume: ResumeState
+    ) -> None:
+        self.driver = driver
+        self.tick = tick
+        self.shared = shared
+        self.seq = resume.seq
+        self.skipped = resume.skipped
+        self.law_count = resume.law
+        self.deadline_ns = 0
+        self.stall_ns = int(stall_s * 1e9)
+        self.stop_requested = False
+        tick.guard.latched = resume.latched
+        words = shared.words
+        words[NEXT_SEQ] = resume.seq
+        words[SKIPPED] = resume.skipped
+        words[LAW] = resume.law
+        words[MAY_ARM] = resume.may_arm
+        words[LATCHED] = resume.latched
+
+    def event(self, code: EventCode, text: str, **fields: float | int | str) -> None:
+        """Tell the supervisor that something happened."""
+        at_ns = self.deadline_ns or time.monotonic_ns()  # before the first tick there is no deadline
+        self.shared.write_event(LoopEvent(code, text, self.seq, at_ns, fields))
+
+    def arm(self) -> bool:
+        """Enable the device and let forces through; False while latched or on the way out.
+
+        Raises:
+            DriverError: the device refuses.
+        """
+        if self.tick.guard.latched or self.stop_requested:
+            return False
+        self.driver.enable()
+        self.tick.arm()
+        self.event(EventCode.ARMED, "armed: forces are let through")
+        return True
+
+    def disarm(self) -> None:
+        """Let go: the request that waits behind no other."""
+        words = self.shared.words
+        asked = words[DISARM]
+        self.tick.release()
+        self.event(EventCode.DISARMED, "disarmed: the force is ramped to zero")
+        words[DISARMED] = asked
+
+    def report_fault(self) -> None:
+        """Tell of the fault that the tick has raised, if any."""
+        tick = self.tick
+        if tick.fault:
+            self.event(EventCode(tick.fault), tick.fault_text)
+            tick.fault = 0
+
+    def leave(self) -> None:
+        """Write down what the next loop on this device goes on from; the tick has been started.
+
+        A device that was tared counts elsewhere once it is opened anew, so it does not arm by itself.
+        """
+        tick = self.tick
+        words = self.shared.words
+        words[NEXT_SEQ] = self.seq
+        words[SKIPPED] = self.skipped
+        words[LAW] = self.law_count
+        words[MAY_ARM] = tick.guard.mode is Mode.ARMED and not any(tick.motion.origin_m)
+        words[LATCHED] = tick.guard.latched
+
+    def latch(self) -> None:
+        """Have the device stay disarmed until the fault that ended the loop is cleared."""
+        self.tick.guard.latched = True
+        self.shared.words[LATCHED] = True
+
+    def enable_or_tell(self) -> None:
+        """Arm, where that needs no one's word; a device that refuses stays disarmed and says why."""
+        try:
+            self.arm()
+        except DriverError as error:
+            self.event(EventCode.DISARMED, f"stays disarmed: {error}")

@@ -1,0 +1,71 @@
+"""What may be asked of a running daemon over its control socket, and what is done about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hapticd.supervisor.commands import Reply
+from hapticd.supervisor.reload import Reload
+from hapticd.supervisor.request_queue import Answer
+from hapticd.supervisor.state import DaemonState
+from hapticd.tick.event import EventCode
+
+KNOWN = ("status", "arm", "disarm", "calibrate", "tare", "clear", "reload", "stop")
+"""What the control socket understands."""
+
+
+class CommandHandler:
+    """Obeys the control socket.
+
+    Args:
+        state: the daemon.
+        reload: takes an edited file over.
+    """
+
+    def __init__(self, state: DaemonState, reload: Reload) -> None:
+        self._state = state
+        self._reload = reload
+
+    def turn(self) -> None:
+        """Do what has been asked for, or pass it on to the loop, whose answer comes later."""
+        state = self._state
+        for request, reply in state.commands.receive():
+            match request["do"]:
+                case "status":
+                    reply(True, status=state.status.made.as_map())
+                case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if state.recovery.lost:
+                    self._without_device(do, reply)
+                case "disarm":
+                    state.requests.disarm(_answering(reply))
+                case "arm" | "calibrate" | "tare" | "clear" as do:
+                    state.requests.submit({"do": do}, _answering(reply))
+                case "reload" if request.get("wait"):
+                    self._reload.ask(_answering(reply))
+                case "reload":
+                    reply(True)
+                    self._reload.ask()
+                case "stop":
+                    state.stop_reason = state.stop_reason or "asked over the control socket"
+                    reply(True)
+                case other:
+                    reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
+
+    def _without_device(self, do: str, reply: Reply) -> None:
+        """What can be done while the device is away is said to the loop that will find it again."""
+        state = self._state
+        recovery = state.recovery
+        match do:
+            case "arm" | "calibrate" | "tare":
+                reply(False, f"there is no device to {do}: {recovery.why}")
+            case "disarm":
+                recovery.amend(replace(recovery.resume, may_arm=False))
+                state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
+                reply(True)
+            case _:
+                recovery.amend(replace(recovery.resume, latched=False))
+                state.tell(EventCode.CLEARED, "fault cleared")
+                reply(True)
+
+
+def _answering(reply: Reply) -> Answer:
+    return lambda verdict: reply(not verdict, verdict)

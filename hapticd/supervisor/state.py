@@ -1,0 +1,77 @@
+"""What a running daemon is made of, for the parts that act on it: the configuration, the loop, who is told."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from hapticd.config.loading import LoadedConfig
+from hapticd.keys.store import KeyRing
+from hapticd.supervisor.child import LoopProcess
+from hapticd.supervisor.commands import CommandSocket
+from hapticd.supervisor.events import EventLog
+from hapticd.supervisor.recovery import Recovery
+from hapticd.supervisor.request_queue import RequestQueue
+from hapticd.supervisor.status import StatusBuilder
+from hapticd.supervisor.systemd import Notifier
+from hapticd.telemetry.publisher import Publisher
+from hapticd.tick.event import EventCode
+
+
+@dataclass(slots=True)
+class DaemonState:
+    """The parts of a running daemon; each is replaced or changed by one part of the supervisor only.
+
+    Attributes:
+        config: what is in force.
+        loop: the control process that has the device, or had it last.
+        requests: what the loop is asked.
+        recovery: looks for a device that is lost.
+        publisher: telemetry.
+        commands: the control socket.
+        status: counts, and the status made of them.
+        event_log: who is told of events.
+        notifier: tells systemd.
+        stop_reason: why the daemon is to end; "" as long as it is not.
+        status_due_s: when the status is published next [s of CLOCK_MONOTONIC].
+    """
+
+    config: LoadedConfig
+    loop: LoopProcess
+    requests: RequestQueue
+    recovery: Recovery
+    publisher: Publisher
+    commands: CommandSocket
+    status: StatusBuilder
+    event_log: EventLog
+    notifier: Notifier
+    stop_reason: str = ""
+    status_due_s: float = 0.0
+
+    def tell(self, code: EventCode, text: str, **fields: float | int | str) -> None:
+        """Tell of an event that the supervisor itself has to report.
+
+        Args:
+            code: what it is.
+            text: in a line.
+            fields: what programs may want to know of it.
+        """
+        self.event_log.tell_now(code, text, self.config, self.loop, **fields)
+
+    def adopt(self, config: LoadedConfig, ring: KeyRing | None) -> None:
+        """Go on with another configuration and other keys; the loop has its part already."""
+        self.config = config
+        self.publisher.reconfigure(config.config.telemetry)
+        if ring is not None:
+            self.publisher.admit(ring)
+            self.commands.admit(ring)
+        self.status_due_s = 0.0
+
+    def take_loop(self, loop: LoopProcess) -> None:
+        """Go on with the control process that has found the device again."""
+        self.loop.close()
+        self.loop = loop
+        self.requests = RequestQueue(loop.shared)
+        self.status.expect(self.recovery.resume)
+        away_s = time.monotonic() - self.recovery.lost_s
+        self.tell(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)
