@@ -33,6 +33,7 @@ HISTORY_S = 8.0
     REQUESTS,  # requests sent
     REQUEST_LENGTH,  # of the last one [bytes]
     ANSWERED,  # requests answered
+    ANSWERED_AT,  # records written when the last one was
     DISARM,  # how often disarming was asked for, which waits behind no request
     DISARMED,  # and how often it was done
     NEXT_SEQ,  # what the loop leaves to the next one: `hapticd.loop.resume`
@@ -40,7 +41,7 @@ HISTORY_S = 8.0
     LAW,
     MAY_ARM,
     LATCHED,
-) = range(13)
+) = range(14)
 """Words, each written by one side only."""
 
 _METRICS = 2048
@@ -133,6 +134,7 @@ class SharedMemory:
         row = verdict.encode(errors="replace")[: _REQUEST - _ANSWER - 8]
         self.view[_ANSWER : _ANSWER + 8] = len(row).to_bytes(8, "little")
         self.view[_ANSWER + 8 : _ANSWER + 8 + len(row)] = row
+        self.words[ANSWERED_AT] = self.words[RECORDS]
         self.words[ANSWERED] = self.words[REQUESTS]
 
     def verdict(self) -> str:

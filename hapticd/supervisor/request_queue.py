@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import ANSWERED, DISARM, DISARMED, RECORDS, REQUESTS, SharedMemory
+from hapticd.loop.memory import ANSWERED, ANSWERED_AT, DISARM, DISARMED, REQUESTS, SharedMemory
 from hapticd.loop.requests import DISARMED_SINCE
 
 MOST_WAITING = 100
@@ -27,7 +27,6 @@ class RequestQueue:
         self._shared = shared
         self._waiting: deque[tuple[dict[str, Any], Answer]] = deque()
         self._posted: Answer | None = None
-        self._answered_at: int | None = None
         self._calibrating = False
         self._disarming: list[Answer] = []
 
@@ -69,13 +68,8 @@ class RequestQueue:
             for answer in answers:
                 answer("")
         if self._posted is not None:
-            if words[ANSWERED] != words[REQUESTS]:
+            if words[ANSWERED] != words[REQUESTS] or fetched <= words[ANSWERED_AT]:
                 return
-            if self._answered_at is None:
-                self._answered_at = words[RECORDS]
-            if fetched <= self._answered_at:
-                return
-            self._answered_at = None
             answer, self._posted = self._posted, None
             self._calibrating = False
             answer(self._shared.verdict())
@@ -101,7 +95,7 @@ class RequestQueue:
                 self._posted(self._shared.verdict())
             else:
                 answers.insert(0, self._posted)
-        self._posted = self._answered_at = None
+        self._posted = None
         self._calibrating = False
         self._disarming = []
         self._waiting.clear()

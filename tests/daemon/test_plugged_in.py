@@ -62,7 +62,7 @@ def test_a_device_that_has_been_away_for_long_is_tried_when_something_is_plugged
 ) -> None:
     monkeypatch.setattr(recovery, "LoopStart", Absent)
     info = Loopback(SimulationOptions(), 1e-3).open()
-    lost: Any = SimpleNamespace(exit_code=0, shared=SimpleNamespace(words=[0] * 13), info=info)
+    lost: Any = SimpleNamespace(exit_code=0, shared=SimpleNamespace(words=[0] * 14), info=info)
     looking = Recovery()
     nothing: Any = None
     looking.begin(lost, "unplugged")
