@@ -1,7 +1,9 @@
 """Time-domain passivity control.
 
 Hannaford & Ryu, "Time-domain passivity control of haptic interfaces", IEEE T-RA 18(1), 2002, eqs. 6-8,
-with the bounds that keep it usable near zero speed (docs/controllers.md, "A fair TDPA").
+with the bounds that keep it usable near zero speed (docs/controllers.md, "A fair TDPA"). The reference energy is that
+of Ryu, Preusche, Hannaford & Hirzinger, "Time domain passivity control with reference energy following", IEEE T-CST
+13(5), 2005.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from pydantic import Field
 from hapticd.law import LawParams
 
 OBSERVER_EXACT, OBSERVER_PRINTED = range(2)
+REFERENCE_ZERO, REFERENCE_STORED = range(2)
 RESET_CONTACT, RESET_NEVER = range(2)
 
 LIMIT = 1e12
@@ -41,6 +44,11 @@ class Params(LawParams):
         "exact",
         description="exact: -F(n-1)(x(n)-x(n-1)) with the applied force; printed: -F(n) v(n) dt, blind to the leak",
     )
+    reference: Literal["zero", "stored"] = Field(
+        "zero",
+        description="energy that must have come in: none, or what the spring has stored, k x^2 / 2, so that a press "
+        "leaves no credit",
+    )
 
 
 class State:
@@ -49,6 +57,7 @@ class State:
     energy_j: float  # observed at the port, after dissipation; < 0 is energy we generated
     damping_n_s_per_m: float  # injected at the last tick
     speed_m_per_s: float  # at the last tick, for the printed observer
+    reference_j: float  # at the last tick; what is missing from it is the debt
 
 
 def start(state: Any, params: Any, snapshot: Any) -> None:
@@ -56,13 +65,14 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.energy_j = min(0.0, -_bounded(snapshot.debt_j))
     state.damping_n_s_per_m = 0.0
     state.speed_m_per_s = 0.0
+    state.reference_j = 0.0
 
 
 def step(state: Any, params: Any, tick: Any) -> float:
     """The contact's own force plus just enough damping to pay the energy debt.  -> force on the device [N]."""
     velocity = tick.velocity_m_per_s
-    if not params.carry_debt and state.energy_j < 0.0:
-        state.energy_j = 0.0
+    if not params.carry_debt and state.energy_j < state.reference_j:
+        state.energy_j = state.reference_j
     if params.observer == OBSERVER_EXACT:
         flow_j = -tick.applied_n * tick.moved_m  # E(n) = E(n-1) - F(n-1) (x(n) - x(n-1))
     else:  # W(n) = W(n-1) + f(n) v(n) + alpha(n-1) v(n-1)^2
@@ -71,14 +81,18 @@ def step(state: Any, params: Any, tick: Any) -> float:
     state.energy_j += flow_j
     state.speed_m_per_s = abs(velocity)
     state.damping_n_s_per_m = 0.0
+    state.reference_j = 0.0
     if not tick.in_contact:
         if params.reset == RESET_CONTACT and state.energy_j > 0.0:
             state.energy_j = 0.0
         return 0.0
+    if params.reference == REFERENCE_STORED:
+        state.reference_j = -0.5 * tick.spring_n * tick.x_m
     force_n: float = tick.contact_n
+    debt_j = state.reference_j - state.energy_j
     payable_per_damping = velocity * velocity * tick.dt_s
-    if state.energy_j < 0.0 and state.speed_m_per_s >= params.min_speed_m_per_s and payable_per_damping > 0.0:
-        damping = _bounded(-state.energy_j / payable_per_damping)  # alpha(n)
+    if debt_j > 0.0 and state.speed_m_per_s >= params.min_speed_m_per_s and payable_per_damping > 0.0:
+        damping = _bounded(debt_j / payable_per_damping)  # alpha(n)
         if params.damping_cap_n_s_per_m > 0.0 and damping > params.damping_cap_n_s_per_m:
             damping = params.damping_cap_n_s_per_m
         state.damping_n_s_per_m = damping
