@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -42,6 +42,7 @@ class Rest:
     peak_to_peak_m: float
     off_m: float
     allowed_m: float
+    depth_m: float
 
     @property
     def still(self) -> bool:
@@ -51,6 +52,14 @@ class Rest:
     def held(self) -> bool:
         """Still and in the right place: a wall that holds still a millimetre too deep is no wall."""
         return self.still and self.off_m <= self.allowed_m
+
+
+@dataclass(frozen=True)
+class Exit:
+    """How a device left the wall after the hand had let go."""
+
+    pull_n: float  # largest force that held it back
+    speed_m_per_s: float  # 0 when it was still in the wall after a second
 
 
 class Rig:
@@ -91,7 +100,20 @@ class Rig:
         plant = self.plant
         depth_m = -plant.hand_n / plant.stiffness_n_per_m
         off_m = abs(plant.sum_m / last + depth_m)
-        return Rest(plant.high_m - plant.low_m, off_m, max(0.1 * depth_m, 3.0 * self.device.resolution_m))
+        return Rest(
+            plant.high_m - plant.low_m, off_m, max(0.1 * depth_m, 3.0 * self.device.resolution_m), -plant.sum_m / last
+        )
+
+    def let_go(self) -> Exit:
+        """Take the hand away and wait until the device is out of the wall."""
+        self.change(hand_n=0.0)
+        pull_n = 0.0
+        for _ in range(round(1.0 / self.device.period_s)):
+            self._drive(self, 1)
+            pull_n = max(pull_n, -self.tick.applied_n)
+            if self.plant.x_m >= 0.0:
+                return Exit(pull_n, self.plant.v_m_per_s)
+        return Exit(pull_n, 0.0)
 
     def change(self, viscous_n_s_per_m: float | None = None, **fields: float) -> None:
         """Another damping of the device, wall or hand from here on."""
@@ -99,6 +121,15 @@ class Rig:
             fields |= _motion(self.device.mass_kg, viscous_n_s_per_m, self.device.period_s)
         for name, value in fields.items():
             setattr(self.plant, name, value)
+
+
+DROPS_M = tuple(i * 0.4e-3 for i in range(21))
+"""Heights from which a device is let fall onto the wall: what comes of one start is chance."""
+
+
+def rests(law: ModuleType, device: Device, params: LawParams | None = None, drive: Any = None) -> list[Rest]:
+    """How the device lies after four seconds, from every height."""
+    return [Rig(law, replace(device, x_m=drop_m), params, drive).run(4.0) for drop_m in DROPS_M]
 
 
 def held(law: ModuleType, device: Device, params: LawParams | None = None, seconds: float = 6.0) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import statistics
 from dataclasses import replace
+from typing import Literal
 
 import pytest
 
@@ -10,7 +12,8 @@ from hapticd.law import LawSnapshot
 from hapticd_controllers import energy_cycle, none, tdpa
 from hapticd_controllers.tdpa import Params
 
-from .plant import PAPER, Device, Rig, held
+from . import machine
+from .plant import PAPER, Device, Rig, held, rests
 
 DROPS_M = (0.0, 0.5e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 7e-3, 8.5e-3, 10e-3)
 AS_PUBLISHED = Params(damping_cap_n_s_per_m=0.0, min_speed_m_per_s=0.0, reset="never")
@@ -71,3 +74,106 @@ def test_the_bounds_bind() -> None:
         rig.run(1e-3)
         assert rig.state.damping_n_s_per_m <= 20.0
         assert rig.state.damping_n_s_per_m == 0.0 or abs(rig.tick.velocity_m_per_s) >= 0.005
+
+
+def outside(rig: Rig, seconds: float = 0.05) -> None:
+    """Draw the device out of the wall and hold it there."""
+    rig.change(hand_n=20.0)
+    while rig.tick.in_contact:
+        rig.run(1e-3)
+    rig.change(hand_n=0.0, v_m_per_s=0.0)
+    rig.run(seconds)
+    assert not rig.tick.in_contact
+
+
+@pytest.mark.parametrize("reset", ["contact", "never"])
+def test_a_debt_survives_the_loss_of_contact(reset: Literal["contact", "never"]) -> None:
+    """It is paid in the next contact: leaving the wall forgives nothing."""
+    rig = Rig(tdpa, Device(), Params(reset=reset))
+    rig.run(0.5)
+    rig.state.energy_j = -0.5
+    outside(rig)
+    owed_j = -rig.state.energy_j
+    assert owed_j > 0.4
+    rig.change(hand_n=-3.0)
+    while not rig.tick.in_contact:
+        rig.run(1e-3)
+    assert rig.state.damping_n_s_per_m == 50.0
+    rig.run(0.05)
+    assert -rig.state.energy_j < owed_j
+
+
+@pytest.mark.parametrize(("reset", "kept"), [("contact", False), ("never", True)])
+def test_only_a_law_that_never_resets_keeps_a_credit_without_contact(
+    reset: Literal["contact", "never"], kept: bool
+) -> None:
+    rig = Rig(tdpa, Device(), Params(reset=reset))
+    rig.run(0.5)
+    rig.state.energy_j = 0.5
+    outside(rig)
+    credit_j = rig.state.energy_j
+    assert (credit_j > 0.4) is kept
+    outside(rig, 1.0)
+    assert rig.state.energy_j == credit_j
+    assert kept or credit_j == 0.0
+
+
+REFERENCE = Params(reference="stored")
+
+
+def test_a_press_leaves_a_credit_and_with_reference_energy_none() -> None:
+    """What went into the spring is there to be spent, unless it is asked for back."""
+    spent = {}
+    for params in (Params(), REFERENCE):
+        rig = Rig(tdpa, Device(x_m=0.005), params)
+        while not rig.tick.in_contact:
+            rig.run(1e-3)
+        rig.run(3e-3)
+        spent[params.reference] = rig.state.damping_n_s_per_m
+    assert spent["zero"] == 0.0
+    assert spent["stored"] > 0.0
+
+
+@pytest.mark.parametrize("hand_n", [-1.0, -3.0, -6.0])
+@pytest.mark.parametrize("stiffness_n_per_m", [12e3, 20e3])
+def test_bounded_with_reference_energy_it_holds_every_start(stiffness_n_per_m: float, hand_n: float) -> None:
+    device = Device(stiffness_n_per_m=stiffness_n_per_m, hand_n=hand_n)
+    assert all(rest.held for rest in rests(tdpa, device, REFERENCE, machine.drive))
+
+
+def test_bounded_with_reference_energy_it_hardly_pulls_who_leaves() -> None:
+    """Let go from 6 N at 12 kN/m; without the reference the debt of the whole press falls due at the exit."""
+    pulls_n = {}
+    for params in (Params(), REFERENCE):
+        rig = Rig(tdpa, Device(hand_n=-6.0), params)
+        rig.run(1.0)
+        pulls_n[params.reference] = rig.let_go().pull_n
+    assert pulls_n["zero"] == pytest.approx(2.3, abs=0.15)
+    assert pulls_n["stored"] == pytest.approx(0.25, abs=0.05)
+
+
+def test_unbounded_with_reference_energy_it_holds_still_in_a_wall_ten_times_too_soft() -> None:
+    params = Params(damping_cap_n_s_per_m=0.0, min_speed_m_per_s=0.0, reset="never", reference="stored")
+    pressed = rests(tdpa, Device(hand_n=-6.0), params, machine.drive)
+    assert all(rest.still for rest in pressed)
+    assert not any(rest.held for rest in pressed)
+    assert 0.9e3 < 6.0 / statistics.median(rest.depth_m for rest in pressed) < 1.4e3
+    lighter = rests(tdpa, Device(), params, machine.drive)
+    assert statistics.median(rest.peak_to_peak_m for rest in lighter) > 5e-3
+
+
+def test_what_is_forgiven_is_what_is_missing_from_the_reference() -> None:
+    rig = Rig(tdpa, Device(), Params(reference="stored", carry_debt=False))
+    rig.run(0.5)
+    stored_j = rig.state.reference_j
+    assert stored_j == pytest.approx(3.0**2 / 2.0 / 12e3, rel=0.1)
+    rig.state.energy_j = -1.0
+    rig.run(1e-3)
+    assert rig.state.energy_j == pytest.approx(stored_j, abs=1e-6)
+
+
+@pytest.mark.parametrize("stiffness_n_per_m", [12e3, 20e3])
+def test_reference_energy_is_no_help_against_a_delay_that_it_does_not_know(stiffness_n_per_m: float) -> None:
+    late = Device(stiffness_n_per_m=stiffness_n_per_m, delay_samples=1)
+    for params in (Params(), REFERENCE):
+        assert not any(rest.still for rest in rests(tdpa, late, params, machine.drive))

@@ -1,0 +1,75 @@
+"""Passive set-position modulation pays for jumps of the set position, and for nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from hapticd.contracts.law import LawSnapshot
+from hapticd_controllers import damper, set_position
+from hapticd_controllers.set_position import Params
+
+from . import machine
+from .plant import Device, Rig, rests
+
+
+@pytest.mark.parametrize("stiffness_n_per_m", [12e3, 20e3])
+@pytest.mark.parametrize("damping_n_s_per_m", [20.0, 50.0])
+def test_a_damper_of_k_dt_over_2_pays_for_every_jump_and_nothing_else_is_left_of_the_law(
+    damping_n_s_per_m: float, stiffness_n_per_m: float
+) -> None:
+    """At the first sample inside the device has moved at least as far as it is deep: B dx^2 / T >= k x^2 / 2."""
+    device = Device(stiffness_n_per_m=stiffness_n_per_m, x_m=0.003)
+    modulated = Rig(set_position, device, Params(damping_n_s_per_m=damping_n_s_per_m))
+    damped = Rig(damper, device, damper.Params(damping_n_s_per_m=damping_n_s_per_m))
+    for seconds, hand_n in ((0.3, -3.0), (0.2, -6.0), (0.2, 2.0), (0.5, -1.0)):
+        for rig in (modulated, damped):
+            rig.change(hand_n=hand_n)
+        for _ in range(round(seconds * 1e3)):
+            modulated.run(1e-3)
+            damped.run(1e-3)
+            assert modulated.tick.applied_n == pytest.approx(damped.tick.applied_n, abs=1e-9)
+
+
+def test_without_a_damper_it_rings_for_ever() -> None:
+    """The local spring leaks as ever: only jumps are in the books."""
+    for rest in rests(set_position, Device(), Params(damping_n_s_per_m=0.0), machine.drive):
+        assert 1.1e-3 < rest.peak_to_peak_m < 1.4e-3
+
+
+def test_without_a_damper_the_surface_is_where_the_device_was_first_seen_inside() -> None:
+    """A jump to the surface would put k x^2 / 2 into the spring, and nobody has paid for it."""
+    rig = Rig(set_position, Device(x_m=0.003), Params(damping_n_s_per_m=0.0))
+    while not rig.tick.in_contact:
+        rig.run(1e-3)
+    assert rig.tick.applied_n == 0.0
+    assert rig.state.set_position_m == rig.tick.x_m
+    rig.run(1e-3)
+    assert 0.0 < rig.tick.applied_n < rig.tick.contact_n
+
+
+@pytest.mark.parametrize("damping_n_s_per_m", [0.0, 1.0, 3.0, 50.0])
+def test_the_energy_never_falls_below_zero(damping_n_s_per_m: float) -> None:
+    for x_m in (0.0, 0.001, 0.005):
+        rig = Rig(set_position, replace(Device(), x_m=x_m), Params(damping_n_s_per_m=damping_n_s_per_m))
+        for _ in range(1000):
+            rig.run(1e-3)
+            assert rig.state.energy_j >= 0.0
+            assert rig.tick.x_m >= 0.0 or rig.tick.x_m <= rig.state.set_position_m <= 0.0
+
+
+def test_it_pulls_back_as_its_damper_does() -> None:
+    rig = Rig(set_position, Device(hand_n=-6.0), drive=machine.drive)
+    rig.run(1.0)
+    assert rig.let_go().pull_n == pytest.approx(2.1, abs=0.1)
+
+
+def test_a_debt_is_dissipated_before_the_wall_stands_where_it_should() -> None:
+    rig = Rig(set_position, Device(x_m=0.003), Params(damping_n_s_per_m=20.0))
+    set_position.start(rig.state, rig.params, LawSnapshot(debt_j=5e-3))
+    while not rig.tick.in_contact:
+        rig.run(1e-3)
+    assert rig.state.set_position_m < 0.0
+    rig.run(2.0)
+    assert rig.state.set_position_m == 0.0
