@@ -166,7 +166,7 @@ def test_what_is_forgiven_is_what_is_missing_from_the_reference() -> None:
     rig = Rig(tdpa, Device(), Params(reference="stored", carry_debt=False))
     rig.run(0.5)
     stored_j = rig.state.reference_j
-    assert stored_j == pytest.approx(3.0**2 / 2.0 / 12e3, rel=0.1)
+    assert stored_j == pytest.approx(6e3 * rig.tick.x_m**2)
     rig.state.energy_j = -1.0
     rig.run(1e-3)
     assert rig.state.energy_j == pytest.approx(stored_j, abs=1e-6)
