@@ -51,4 +51,5 @@ def step(state: Any, params: Any, tick: Any) -> float:
         state.energy_j += p_n_per_m * tick.moved_m * tick.moved_m - tick.applied_n * tick.moved_m
     state.was_in_contact = tick.in_contact
     most_n = 2.0 * math.sqrt(p_n_per_m * max(0.0, state.energy_j))
-    return max(-most_n, min(tick.contact_n, most_n))
+    force_n: float = max(-most_n, min(tick.contact_n, most_n))
+    return force_n

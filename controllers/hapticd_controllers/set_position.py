@@ -66,5 +66,6 @@ def step(state: Any, params: Any, tick: Any) -> float:
     else:
         state.energy_j = min(0.0, budget_j)
         state.set_position_m = tick.x_m + math.sqrt(2.0 * max(0.0, budget_j) / wall_n_per_m)
-    wall_n: float = tick.contact_n - tick.spring_n  # its own damping is passed on as it is
-    return wall_n + wall_n_per_m * (state.set_position_m - tick.x_m) - braking * tick.velocity_m_per_s
+    force_n: float = tick.contact_n - tick.spring_n  # the wall's own damping is passed on as it is
+    force_n += wall_n_per_m * (state.set_position_m - tick.x_m) - braking * tick.velocity_m_per_s
+    return force_n

@@ -19,7 +19,7 @@ PAPER = "energy-cycle"
 _BARE = {"cap": "none", "force_delay": "none", "small_leaks": 0.0}
 # What one change from the default does not show.
 _COMBINED: dict[str, tuple[dict[str, Any], ...]] = {
-    "tdpa": (TDPA_AS_PUBLISHED, {**TDPA_AS_PUBLISHED, "observer": "printed"}),
+    "tdpa": (TDPA_AS_PUBLISHED, {**TDPA_AS_PUBLISHED, "observer": "printed"}, {"reference": "stored"}),
     PAPER: (
         {"window": 1},
         {"small_leaks": 0.0},
