@@ -135,6 +135,9 @@ def test_every_choice_of_the_papers_law_is_a_reading_that_its_parameters_take() 
         assert params_on(reading, DEVICES[0]) is not None
     known = next(reading for reading in readings if reading.label == f"{PAPER}:cap=known-mass")
     assert params_on(known, DEVICES[3]).model_dump()["mass_kg"] == DEVICES[3].options.mass_kg
+    bounding = next(reading for reading in readings if reading.label == "energy-bounding")
+    told = params_on(bounding, DEVICES[3]).model_dump()["device_damping_n_s_per_m"]
+    assert told == DEVICES[3].options.viscous_n_s_per_m
     assert params_on(DEFAULT, DEVICES[3]) == plugins.law(PAPER).Params()
 
 

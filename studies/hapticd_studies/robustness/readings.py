@@ -66,10 +66,12 @@ def every_reading() -> list[LawSpec]:
 
 
 def params_on(reading: LawSpec, device: Device) -> LawParams:
-    """The parameters on a device: a law that wants to know the mass is told what the maker could know."""
+    """The parameters on a device: a law that wants to know mass or damping is told what the maker could know."""
     values = dict(reading.values)
     if values.get("cap") == "known-mass":
         values.setdefault("mass_kg", device.options.mass_kg)
+    if "device_damping_n_s_per_m" in reading.law.Params.model_fields:
+        values.setdefault("device_damping_n_s_per_m", device.options.viscous_n_s_per_m)
     params: LawParams = reading.law.Params.model_validate(values)
     return params
 
