@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import Field
 
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 
 
 class Params(LawParams):

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import Field
 
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 
 SOFTEST, STIFFEST = 1e-12, 1e12
 """Stiffness of a wall [N/m] within which nothing is divided by zero or overflows."""

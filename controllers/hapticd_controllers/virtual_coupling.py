@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import Field
 
-from hapticd.contracts.law import LawParams
+from hapticd.law import LawParams
 
 LIMIT = 1e12
 """No stiffness [N/m] or position [m] grows beyond this, so that nothing ever overflows."""

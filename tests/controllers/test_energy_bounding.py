@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hapticd.contracts.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
+from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
 from hapticd_controllers import energy_bounding
 from hapticd_controllers.energy_bounding import Params
 

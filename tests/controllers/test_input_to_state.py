@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from hapticd.contracts.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
+from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
 from hapticd_controllers import damper, input_to_state
 from hapticd_controllers.input_to_state import Params
 

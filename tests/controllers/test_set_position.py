@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hapticd.contracts.law import LawSnapshot
+from hapticd.law import LawSnapshot
 from hapticd_controllers import damper, set_position
 from hapticd_controllers.set_position import Params
 
