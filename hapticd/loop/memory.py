@@ -44,6 +44,12 @@ HISTORY_S = 8.0
 ) = range(14)
 """Words, each written by one side only."""
 
+DISARMED_SINCE = "not done: disarming was asked for after it"
+"""The answer to a request that would put forces on after all, on either side of the memory."""
+
+LARGEST_ANSWER = 1 << 16
+"""Of the packet with which a control process says that it is ready, or why it is not [bytes]."""
+
 _METRICS = 2048
 _ANSWER = 4096
 _REQUEST = 8192

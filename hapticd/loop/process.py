@@ -39,7 +39,6 @@ WARM_UP_TICKS = 200
 DEVICE_LOST = 3
 """Exit code: the device is gone, and may come back."""
 
-LARGEST_ANSWER = 1 << 16
 _LONGEST_ERROR = 1 << 14
 
 

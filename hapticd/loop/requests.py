@@ -14,7 +14,7 @@ from hapticd import plugins
 from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
 from hapticd.driver import DriverState
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import DISARM
+from hapticd.loop.memory import DISARM, DISARMED_SINCE
 from hapticd.loop.session import Session
 from hapticd.loop.worker import Worker
 from hapticd.tick.contact import RunningLaw
@@ -23,8 +23,6 @@ from hapticd.tick.guard import Mode
 
 _SWITCH_INTERVAL_S = 5e-5
 """How soon an import that runs beside the loop gives the interpreter back to it [s]."""
-
-DISARMED_SINCE = "not done: disarming was asked for after it"
 
 
 class RequestHandler:

@@ -19,8 +19,15 @@ from hapticd.config.loading import LoadedConfig
 from hapticd.config.models import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, HapticdError
-from hapticd.loop.memory import RECORDS, SKIPPED, SUPERVISOR_BEAT, EventReader, RecordReader, SharedMemory
-from hapticd.loop.process import LARGEST_ANSWER
+from hapticd.loop.memory import (
+    LARGEST_ANSWER,
+    RECORDS,
+    SKIPPED,
+    SUPERVISOR_BEAT,
+    EventReader,
+    RecordReader,
+    SharedMemory,
+)
 from hapticd.loop.resume import FROM_START, ResumeState
 from hapticd.tick.record import RecordLayout
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hapticd.supervisor.commands import Reply
-from hapticd.supervisor.reload import Reload
 from hapticd.supervisor.request_queue import Answer
 from hapticd.supervisor.state import DaemonState
 from hapticd.tick.event import EventCode
@@ -19,12 +18,10 @@ class CommandHandler:
 
     Args:
         state: the daemon.
-        reload: takes an edited file over.
     """
 
-    def __init__(self, state: DaemonState, reload: Reload) -> None:
+    def __init__(self, state: DaemonState) -> None:
         self._state = state
-        self._reload = reload
 
     def turn(self) -> None:
         """Do what has been asked for, or pass it on to the loop, whose answer comes later."""
@@ -40,10 +37,10 @@ class CommandHandler:
                 case "arm" | "calibrate" | "tare" | "clear" as do:
                     state.requests.submit({"do": do}, _answering(reply))
                 case "reload" if request.get("wait"):
-                    self._reload.ask(_answering(reply))
+                    state.reload_asked.append(_answering(reply))
                 case "reload":
                     reply(True)
-                    self._reload.ask()
+                    state.reload_asked.append(_unanswered)
                 case "stop":
                     state.stop_reason = state.stop_reason or "asked over the control socket"
                     reply(True)
@@ -65,6 +62,10 @@ class CommandHandler:
                 recovery.amend(replace(recovery.resume, latched=False))
                 state.tell(EventCode.CLEARED, "fault cleared")
                 reply(True)
+
+
+def _unanswered(_verdict: str) -> None:
+    """For one who does not wait: the event log has the verdict."""
 
 
 def _answering(reply: Reply) -> Answer:

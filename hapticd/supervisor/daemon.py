@@ -102,7 +102,7 @@ class Daemon:
             undo.callback(lambda: self._end(self.state.loop))  # by then it may be another one
             self._reload = Reload(self.state)
             undo.callback(self._reload.close)
-            self._handler = CommandHandler(self.state, self._reload)
+            self._handler = CommandHandler(self.state)
             self._undo = undo.pop_all()
         self._device_lost: LoopEvent | None = None
         self._problem = ""
@@ -257,7 +257,7 @@ class Daemon:
         if self._terminal.closed():
             self.stop("the terminal was closed")
         else:
-            self._reload.ask()
+            self.state.reload_asked.append(lambda _verdict: None)
 
     def _loop_ended(self) -> None:
         state = self.state

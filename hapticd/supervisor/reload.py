@@ -39,34 +39,26 @@ class Reload:
 
     def __init__(self, state: DaemonState) -> None:
         self._state = state
-        self._waiting: list[Answer] = []
         self._under_way = False
         self._watcher: FileWatcher | None = None
         self._follow()
 
-    def ask(self, answer: Answer = lambda _: None) -> None:
-        """Read the file again at the next turn; a file that cannot be used changes nothing.
-
-        Args:
-            answer: told "" when the file is in force, else why it is not.
-        """
-        self._waiting.append(answer)
-
     def turn(self) -> None:
-        """Begin what was asked for, or what was saved; returns at once."""
+        """Begin what was asked for, or what was saved; returns at once. A file that cannot be used changes nothing."""
         if self._under_way:
             return
         saved = self._watcher.take() if self._watcher is not None else None
-        if self._waiting:
-            answers, self._waiting = self._waiting, []
+        state = self._state
+        if state.reload_asked:
+            answers, state.reload_asked = state.reload_asked, []
             try:
-                path = self._state.config.path
+                path = state.config.path
                 self._begin(parse(read(path, files_only=True), str(path)), answers)
             except HapticdError as error:
                 self._refuse(str(error), answers)
         elif isinstance(saved, ConfigError):
             self._refuse(str(saved), [])
-        elif saved is not None and saved.text != self._state.config.text:
+        elif saved is not None and saved.text != state.config.text:
             self._begin(saved, [])
 
     def close(self) -> None:

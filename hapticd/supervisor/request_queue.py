@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import ANSWERED, ANSWERED_AT, DISARM, DISARMED, REQUESTS, SharedMemory
-from hapticd.loop.requests import DISARMED_SINCE
+from hapticd.loop.memory import ANSWERED, ANSWERED_AT, DISARM, DISARMED, DISARMED_SINCE, REQUESTS, SharedMemory
 
 MOST_WAITING = 100
 

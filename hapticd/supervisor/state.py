@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.keys.store import KeyRing
@@ -11,7 +11,7 @@ from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.commands import CommandSocket
 from hapticd.supervisor.events import EventLog
 from hapticd.supervisor.recovery import Recovery
-from hapticd.supervisor.request_queue import RequestQueue
+from hapticd.supervisor.request_queue import Answer, RequestQueue
 from hapticd.supervisor.status import StatusBuilder
 from hapticd.supervisor.systemd import Notifier
 from hapticd.telemetry.publisher import Publisher
@@ -32,6 +32,7 @@ class DaemonState:
         status: counts, and the status made of them.
         event_log: who is told of events.
         notifier: tells systemd.
+        reload_asked: answers to those who asked for a reload that has not begun.
         stop_reason: why the daemon is to end; "" as long as it is not.
         status_due_s: when the status is published next [s of CLOCK_MONOTONIC].
     """
@@ -45,6 +46,7 @@ class DaemonState:
     status: StatusBuilder
     event_log: EventLog
     notifier: Notifier
+    reload_asked: list[Answer] = field(default_factory=list)
     stop_reason: str = ""
     status_due_s: float = 0.0
 
