@@ -8,8 +8,7 @@ interpreted and compiled with equal results to the last bit. Switches in capital
 """
 
 from hapticd.simulation.plant.arithmetic import sine
-from hapticd.simulation.plant.coefficients import delay_line, epochs, start_state, terms
-from hapticd.simulation.plant.hand import recorded_points
+from hapticd.simulation.plant.coefficients import delay_line, epochs, recorded_points, start_state, terms
 from hapticd.simulation.plant.hold import flow
 from hapticd.simulation.plant.state import Buffers, PlantParams, PlantState
 from hapticd.simulation.plant.step import move, sense

@@ -3,10 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from hapticd.config.timing import first_tick
-from hapticd.simulation.options import SimulationOptions
-from hapticd.simulation.plant.hand import hand_fields, hand_terms
+from hapticd.simulation.options import (
+    ChirpForce,
+    ConstantForce,
+    PressAndReleaseForce,
+    RampForce,
+    RecordedForce,
+    SimulationOptions,
+    SineForce,
+    StepForce,
+)
+from hapticd.simulation.plant.hand import (
+    PROFILE_CHIRP,
+    PROFILE_CONSTANT,
+    PROFILE_PRESS,
+    PROFILE_RAMP,
+    PROFILE_RECORDED,
+    PROFILE_SINE,
+    PROFILE_STEP,
+)
 from hapticd.simulation.plant.hold import flow
 from hapticd.simulation.plant.stepped import METHODS
 
@@ -19,6 +37,16 @@ MOST_TURNS = 1e5
 """The spring of the hand may swing so many times in a period: 1e-16 of an angle each time, and the phase is known."""
 
 LONGEST_PERIOD_S = 1e6
+
+_PROFILES: dict[type[Any], int] = {
+    ConstantForce: PROFILE_CONSTANT,
+    StepForce: PROFILE_STEP,
+    RampForce: PROFILE_RAMP,
+    SineForce: PROFILE_SINE,
+    ChirpForce: PROFILE_CHIRP,
+    PressAndReleaseForce: PROFILE_PRESS,
+    RecordedForce: PROFILE_RECORDED,
+}
 
 
 def start_state(options: SimulationOptions) -> dict[str, float | int]:
@@ -75,13 +103,68 @@ def terms(options: SimulationOptions) -> dict[str, bool]:
         "SEMI_IMPLICIT": options.integrator == "semi-implicit-euler",
         "VERLET": options.integrator == "velocity-verlet",
         "RK4": options.integrator == "rk4",
-        **hand_terms(options),
+        **_hand_terms(options),
     }
 
 
 def delay_line(options: SimulationOptions) -> list[float]:
     """An empty delay line."""
     return [0.0] * (options.force_delay_samples + 1)
+
+
+def recorded_points(options: SimulationOptions) -> tuple[list[float], list[float]]:
+    """Times and forces of a recorded hand; one point at rest for any other."""
+    force = options.hand.force
+    if not isinstance(force, RecordedForce):
+        return [0.0], [0.0]
+    return [time_s for time_s, _ in force.points], [newton for _, newton in force.points]
+
+
+def _hand_terms(options: SimulationOptions) -> dict[str, bool]:
+    """Which switches a hand needs on."""
+    force = options.hand.force
+    return {
+        "HAND": not (isinstance(force, ConstantForce) and force.newton == 0.0),
+        "TIMED": not isinstance(force, ConstantForce),
+        "HAND_STEP": isinstance(force, StepForce),
+        "HAND_RAMP": isinstance(force, RampForce),
+        "HAND_SINE": isinstance(force, SineForce),
+        "HAND_CHIRP": isinstance(force, ChirpForce),
+        "HAND_PRESS": isinstance(force, PressAndReleaseForce),
+        "HAND_RECORDED": isinstance(force, RecordedForce),
+    }
+
+
+def _hand_fields(options: SimulationOptions) -> dict[str, float | int]:
+    """The fields of `PlantParams` that say what the hand does."""
+    force = options.hand.force
+    fields: dict[str, float | int] = {
+        "hand_profile": _PROFILES[type(force)],
+        "hand_n": 0.0,
+        "hand_from_n": 0.0,
+        "hand_at_s": 0.0,
+        "hand_duration_s": 1.0,
+        "hand_hz": 0.0,
+        "hand_end_hz": 0.0,
+        "hand_repeat": 0,
+    }
+    if isinstance(force, RecordedForce):
+        fields["hand_repeat"] = int(force.repeat)
+    else:
+        fields["hand_n"] = force.newton
+    if isinstance(force, StepForce | RampForce):
+        fields |= {"hand_from_n": force.from_newton, "hand_at_s": force.at_s}
+    if isinstance(force, RampForce | ChirpForce):
+        fields["hand_duration_s"] = force.duration_s
+    if isinstance(force, SineForce | ChirpForce):
+        fields["hand_from_n"] = force.offset_newton
+    if isinstance(force, SineForce):
+        fields["hand_hz"] = force.frequency_hz
+    if isinstance(force, ChirpForce):
+        fields |= {"hand_hz": force.start_hz, "hand_end_hz": force.end_hz}
+    if isinstance(force, PressAndReleaseForce):
+        fields |= {"hand_from_n": force.release_newton, "hand_hz": 1.0 / force.period_s}
+    return fields
 
 
 def _params(options: SimulationOptions, values: dict[str, float], period_s: float) -> dict[str, float | int]:
@@ -124,7 +207,7 @@ def _params(options: SimulationOptions, values: dict[str, float], period_s: floa
         "substep_s": period_s / options.substeps,
         "resolution_m": options.resolution_m,
         "noise_m": options.noise_m * math.sqrt(3.0),
-        **hand_fields(options),
+        **_hand_fields(options),
     }
 
 

@@ -2,18 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from hapticd.simulation.options import (
-    ChirpForce,
-    ConstantForce,
-    PressAndReleaseForce,
-    RampForce,
-    RecordedForce,
-    SimulationOptions,
-    SineForce,
-    StepForce,
-)
 from hapticd.simulation.plant.arithmetic import sine
 from hapticd.simulation.plant.state import Buffers, PlantParams, PlantState
 
@@ -27,17 +15,6 @@ HAND_PRESS: bool = True
 HAND_RECORDED: bool = True
 
 PROFILE_CONSTANT, PROFILE_STEP, PROFILE_RAMP, PROFILE_SINE, PROFILE_CHIRP, PROFILE_PRESS, PROFILE_RECORDED = range(7)
-
-
-_PROFILES: dict[type[Any], int] = {
-    ConstantForce: PROFILE_CONSTANT,
-    StepForce: PROFILE_STEP,
-    RampForce: PROFILE_RAMP,
-    SineForce: PROFILE_SINE,
-    ChirpForce: PROFILE_CHIRP,
-    PressAndReleaseForce: PROFILE_PRESS,
-    RecordedForce: PROFILE_RECORDED,
-}
 
 
 def hand_force(state: PlantState, params: PlantParams, buffers: Buffers) -> float:
@@ -85,58 +62,3 @@ def recorded(state: PlantState, params: PlantParams, buffers: Buffers, t_s: floa
         return from_n  # type: ignore[no-any-return]  # an array has no type for its elements
     share = (t_s - from_s) / (buffers.points_s[at + 1] - from_s)
     return from_n + share * (buffers.points_n[at + 1] - from_n)  # type: ignore[no-any-return]  # an array has no type for its elements
-
-
-def recorded_points(options: SimulationOptions) -> tuple[list[float], list[float]]:
-    """Times and forces of a recorded hand; one point at rest for any other."""
-    force = options.hand.force
-    if not isinstance(force, RecordedForce):
-        return [0.0], [0.0]
-    return [time_s for time_s, _ in force.points], [newton for _, newton in force.points]
-
-
-def hand_terms(options: SimulationOptions) -> dict[str, bool]:
-    """Which switches a hand needs on."""
-    force = options.hand.force
-    return {
-        "HAND": not (isinstance(force, ConstantForce) and force.newton == 0.0),
-        "TIMED": not isinstance(force, ConstantForce),
-        "HAND_STEP": isinstance(force, StepForce),
-        "HAND_RAMP": isinstance(force, RampForce),
-        "HAND_SINE": isinstance(force, SineForce),
-        "HAND_CHIRP": isinstance(force, ChirpForce),
-        "HAND_PRESS": isinstance(force, PressAndReleaseForce),
-        "HAND_RECORDED": isinstance(force, RecordedForce),
-    }
-
-
-def hand_fields(options: SimulationOptions) -> dict[str, float | int]:
-    """The fields of `PlantParams` that say what the hand does."""
-    force = options.hand.force
-    fields: dict[str, float | int] = {
-        "hand_profile": _PROFILES[type(force)],
-        "hand_n": 0.0,
-        "hand_from_n": 0.0,
-        "hand_at_s": 0.0,
-        "hand_duration_s": 1.0,
-        "hand_hz": 0.0,
-        "hand_end_hz": 0.0,
-        "hand_repeat": 0,
-    }
-    if isinstance(force, RecordedForce):
-        fields["hand_repeat"] = int(force.repeat)
-    else:
-        fields["hand_n"] = force.newton
-    if isinstance(force, StepForce | RampForce):
-        fields |= {"hand_from_n": force.from_newton, "hand_at_s": force.at_s}
-    if isinstance(force, RampForce | ChirpForce):
-        fields["hand_duration_s"] = force.duration_s
-    if isinstance(force, SineForce | ChirpForce):
-        fields["hand_from_n"] = force.offset_newton
-    if isinstance(force, SineForce):
-        fields["hand_hz"] = force.frequency_hz
-    if isinstance(force, ChirpForce):
-        fields |= {"hand_hz": force.start_hz, "hand_end_hz": force.end_hz}
-    if isinstance(force, PressAndReleaseForce):
-        fields |= {"hand_from_n": force.release_newton, "hand_hz": 1.0 / force.period_s}
-    return fields
