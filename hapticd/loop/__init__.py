@@ -1,1 +1,1 @@
-"""The control process: it owns the driver and runs the tick on time."""
+"""The loop, a process of its own: it owns the driver and runs the tick on time."""

@@ -1,9 +1,9 @@
-"""The memory that the control process and the supervisor share.
+"""The memory that the loop and the supervisor share.
 
     words | the driver's metrics | answer | request | events | tick records
 
 One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
-copied a slot: on x86 stores become visible in order, so what was not overwritten meanwhile is whole. Other machines
+copied a slot: on x86 stores become visible in order, so what was not overwritten by then is whole. Other machines
 do not promise that, and plain Python cannot ask them to, so they are refused.
 
 The memory is an anonymous file: it has no name, and it is gone when both processes are.
@@ -48,7 +48,7 @@ DISARMED_SINCE = "not done: disarming was asked for after it"
 """The answer to a request that would put forces on after all, on either side of the memory."""
 
 LARGEST_ANSWER = 1 << 16
-"""Of the packet with which a control process says that it is ready, or why it is not [bytes]."""
+"""Of the packet with which the loop's process says that it is ready, or why it is not [bytes]."""
 
 _METRICS = 2048
 _ANSWER = 4096
@@ -61,7 +61,7 @@ _RECORDS = _EVENTS + _EVENT_SIZE * _EVENT_SLOTS
 
 
 class SharedMemory:
-    """The shared memory of one control process.
+    """The shared memory of one loop.
 
     Args:
         layout: how a record lies in memory.
@@ -171,7 +171,7 @@ class RecordReader:
         return self._next
 
     def read(self, most: int = 4096) -> list[TickRecord]:
-        """The records that are new, oldest first, at most so many."""
+        """The records that are new, oldest first, at most `most`."""
         layout = self._shared.layout
         slots = self._shared.slots
         words = self._shared.words

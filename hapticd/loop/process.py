@@ -1,4 +1,4 @@
-"""The control process: what runs behind `python -m hapticd.loop.process`.
+"""The process of the loop: what runs behind `python -m hapticd.loop.process`.
 
 The supervisor starts it with the configuration's text on its standard input and one end of a socket pair as its
 descriptor `--socket`. It answers with one packet: what it found and the descriptor of the shared memory, or why it
@@ -43,7 +43,7 @@ _LONGEST_ERROR = 1 << 14
 
 
 def main() -> int:
-    """Run the control process; the exit code says how it went."""
+    """Run the loop; the exit code says how it went."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--socket", type=int, required=True)
     parser.add_argument("--parent", type=int, required=True)

@@ -92,7 +92,7 @@ class RequestHandler:
             try:
                 session.driver.calibrate()
                 ended.append(None)
-            except Exception as error:  # noqa: BLE001 - handed over to whoever asked
+            except Exception as error:  # noqa: BLE001 - handed over to who asked
                 ended.append(error)
 
         words = session.shared.words

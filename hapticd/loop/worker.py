@@ -52,4 +52,4 @@ class Worker:
             work, self._work = self._work, None
             if work is not None:
                 work()
-            del work  # nobody keeps what it has raised
+            del work  # what it has raised is not kept

@@ -1,1 +1,1 @@
-"""The supervisor process: starts and watches the control process, publishes what it records, talks to systemd."""
+"""The supervisor process: starts and watches the loop's process, publishes what it records, talks to systemd."""

@@ -1,4 +1,4 @@
-"""The control process as the supervisor sees it: look after it, end it."""
+"""The process of the loop as the supervisor sees it: start it, look after it, end it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ STALL_S = 0.1
 
 
 class LoopProcess:
-    """A running control process.
+    """A running loop.
 
     Args:
         process: the process.
@@ -139,7 +139,7 @@ class LoopProcess:
 
 
 def end(process: subprocess.Popen[bytes]) -> bool:
-    """Let a control process ramp its force out and end; kill it when it does not, and return False."""
+    """Let a loop ramp its force out and end; kill it when it does not, and return False."""
     with contextlib.suppress(ProcessLookupError):
         process.terminate()
     try:
@@ -151,7 +151,7 @@ def end(process: subprocess.Popen[bytes]) -> bool:
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
-    """End a control process at once, whatever it is doing."""
+    """End a loop at once, whatever it is doing."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(process.pid, signal.SIGKILL)
     with contextlib.suppress(subprocess.TimeoutExpired):  # whatever can be done without it has to be done now
@@ -163,12 +163,12 @@ TIMEOUT_S = 30.0
 
 
 class LoopStart:
-    """A control process on its way.
+    """A loop on its way.
 
     Made in the main thread only: the kernel tells a child of its parent's death when the thread that made it ends.
 
     Args:
-        config: what it shall run.
+        config: what it is to run.
         resume: where the loop before stopped, when this one goes on for it.
     """
 
@@ -177,7 +177,7 @@ class LoopStart:
         self._give_up_s = time.monotonic() + TIMEOUT_S
         request = msgpack.packb({"text": config.text, "name": str(config.path), "resume": asdict(resume)})
         self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        # The request lies in a file, so that nobody waits for the other side to read it.
+        # The request lies in a file, so that neither side waits for the other.
         with theirs, os.fdopen(os.memfd_create("request"), "w+b") as file:
             file.write(request)
             file.seek(0)
@@ -194,7 +194,7 @@ class LoopStart:
             )
 
     def poll(self, timeout_s: float = 0.0) -> LoopProcess | None:
-        """The running control process; None while it is not ready.
+        """The running loop; None while it is not ready.
 
         Args:
             timeout_s: how long to wait for it [s].
@@ -213,7 +213,7 @@ class LoopStart:
         if not descriptors:
             self.end()
             if not answer:
-                raise HapticdError("the control process died while it started; its last words are above")
+                raise HapticdError("the loop died while it started; its last words are above")
             refusal = msgpack.unpackb(answer)
             if refusal["exit_code"] == ConfigError.exit_code:
                 raise ConfigError(*refusal["error"].split("\n"))

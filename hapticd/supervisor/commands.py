@@ -1,4 +1,4 @@
-"""The control socket: requests from this computer, and from others with keys, answered by whoever they are for.
+"""The control socket: requests from this computer, and from others with keys, each with a way to answer it.
 
 A request is one msgpack map with the key `do`; the answer is one with `ok` and `text`. What is not understood is
 refused by name, and nothing that arrives can raise.
@@ -60,7 +60,7 @@ class CommandSocket:
         return self._gate.endpoint if self._gate is not None else None
 
     def admit(self, ring: KeyRing) -> None:
-        """Take other keys over; whoever is no longer listed is disconnected."""
+        """Take other keys over; who is no longer listed is disconnected."""
         if self._gate is not None:
             self._gate.renew(ring.pair, ring.commanders())
 
@@ -105,7 +105,7 @@ class CommandSocket:
     def _replier(self, identity: bytes) -> Reply:
         def reply(ok: bool, text: str = "", **fields: Any) -> None:
             answer = msgpack.packb({"ok": ok, "text": text, **fields})
-            with contextlib.suppress(zmq.ZMQError):  # whoever asked has gone
+            with contextlib.suppress(zmq.ZMQError):  # who asked has gone
                 self._socket.send_multipart((identity, answer), zmq.NOBLOCK)
 
         return reply

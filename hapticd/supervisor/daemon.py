@@ -1,4 +1,4 @@
-"""The daemon: what `hapticd run` does until it is told to stop."""
+"""The daemon: what `hapticd run` does until it is to stop."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def pause_s(flush_due_ns: int | None, now_ns: int) -> float:
 
 
 def _noted(record: TickRecord) -> tuple[object, ...]:
-    """What of a tick is told by a status of its own when it changes."""
+    """What of a tick has a status published when it changes."""
     return record.flags & ~Flag.LIMITED, *(wall.stiffness_n_per_m for wall in record.walls)
 
 
@@ -77,7 +77,7 @@ class Daemon:
             undo.callback(self.lock.close)
             self.release = ForceRelease(config)
             undo.callback(self.release.close)
-            self.release.wait_ready()  # before there can be a force to take away; that it is not ready is told later
+            self.release.wait_ready()  # before there can be a force to take away; that it is not ready is said later
             loop = LoopStart(config).wait()
             starting = undo.enter_context(contextlib.ExitStack())
             starting.callback(self._end, loop)
@@ -110,7 +110,7 @@ class Daemon:
         self._stop_by_s = 0.0
 
     def run(self) -> int:
-        """Serve until told to stop; returns the exit code."""
+        """Serve until it is to stop; returns the exit code."""
         try:
             return asyncio.run(self._serve())
         finally:
@@ -242,7 +242,7 @@ class Daemon:
         """Tell when no helper is ready to take the force away; the status says so as long as it is so."""
         before, self._problem = self._problem, self.release.problem if self.exit_code is None else ""
         if self._problem and not before:
-            self.state.tell(EventCode.NOBODY_STANDS_BY, self._problem)
+            self.state.tell(EventCode.HELPER_MISSING, self._problem)
 
     def _look_for_device(self) -> None:
         """Try again when it is time; that nothing ticks until then is no reason for systemd to intervene."""
@@ -268,7 +268,7 @@ class Daemon:
             self.exit_code = 0
         else:
             how = f"was killed by signal {-code}" if code and code < 0 else f"ended with exit code {code}"
-            self._loop_lost(f"the control process {how}")
+            self._loop_lost(f"the loop's process {how}")
 
     def _begin_recovery(self, event: LoopEvent) -> None:
         """The loop has told that its device is gone; it is just ending."""

@@ -98,7 +98,7 @@ class EventLog:
             self.tell_now(EventCode.SUBSCRIBER_FLOOD, text, config, loop, subscriptions=count - before)
 
     def close(self, config: LoadedConfig, loop: LoopProcess, timeout_s: float) -> None:
-        """Write the fault records that wait; a slow disk has so long [s]."""
+        """Write the fault records that wait; a slow disk has this long [s]."""
         problem = self.recorder.close(config.config.faults.keep, timeout_s)
         if problem:
             self.tell_now(EventCode.FAULT_RECORD_FAILED, problem, config, loop)

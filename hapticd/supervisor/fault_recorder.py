@@ -150,7 +150,7 @@ class _Job(threading.Thread):
             self._shared.close()
 
     def _rows(self) -> Iterator[bytes]:
-        """The rows as they lie in the ring, without those that were overwritten meanwhile."""
+        """The rows as they lie in the ring, without those that were overwritten since."""
         size = self._shared.layout.size
         slots = self._shared.slots
         area = self._shared.record_area

@@ -19,7 +19,7 @@ from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import ConfigError
 
 QUIET_S = 0.25
-"""A file counts as saved when it has not changed for so long [s]."""
+"""A file counts as saved when it has not changed for this long [s]."""
 
 LOOK_S = 1.0
 """How often the file is looked at in any case [s]: no directory tells what happened before it was watched."""
@@ -34,7 +34,7 @@ logging.getLogger("watchfiles").setLevel(logging.WARNING)  # else it tells of ev
 
 
 class FileWatcher:
-    """Looks at a file from a thread of its own, so that a slow disk is nobody else's trouble.
+    """Looks at a file from a thread of its own, so that a slow disk holds nothing else up.
 
     Args:
         path: the file.
@@ -63,7 +63,7 @@ class FileWatcher:
         self._closed.set()
 
     def wait_closed(self) -> None:
-        """Return when nobody looks any more: compiled code must not find the interpreter gone when it comes back."""
+        """Return when the thread has ended: compiled code must not find the interpreter gone when it comes back."""
         self._thread.join(CLOSE_S)
 
     def _run(self) -> None:

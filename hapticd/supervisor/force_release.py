@@ -1,8 +1,8 @@
-"""Take the force away after a control process that died or hangs: `python -m hapticd.supervisor.force_release`.
+"""Take the force away after a loop that died or hangs: `python -m hapticd.supervisor.force_release`.
 
-A process of its own, so that a driver that hangs cannot hang the supervisor. It stands by from the start with
+A process of its own, so that a driver that hangs cannot hang the supervisor. It is ready from the start with
 everything imported, since the device holds its last force until it is released, and the start of an interpreter would
-be most of that time. A byte on its standard output says that it stands by; it then reads one from its standard input:
+be most of that time. A byte on its standard output says that it is ready; it then reads one from its standard input:
 one means release, none that it is not needed. Where the loop is a real-time process so is this, so that a computer
 with more work than processors does not make it late.
 """
@@ -27,14 +27,14 @@ READY_TIMEOUT_S = 10.0
 TIMEOUT_S = 2.0
 """How long the device may take to let go [s]."""
 
-_NOBODY = (
-    "nobody stands by to take the force away should the control loop die: the process for it did not start, or was "
+_NO_HELPER = (
+    "no helper is ready to take the force away if the loop dies: its process did not start, or was "
     "ended; restart hapticd"
 )
 
 
 class ForceRelease:
-    """A helper that stands by.
+    """A helper that is ready.
 
     Args:
         config: names the device; what of it a reload may change is of no matter here.
@@ -47,11 +47,11 @@ class ForceRelease:
 
     @property
     def problem(self) -> str:
-        """Why the force would not be taken away at once, a line for people; "" while the helper stands by."""
-        return "" if self._helper.poll() is None and self.wait_ready(0.0) else _NOBODY
+        """Why the force would not be taken away at once, a line for people; "" while the helper is ready."""
+        return "" if self._helper.poll() is None and self.wait_ready(0.0) else _NO_HELPER
 
     def wait_ready(self, timeout_s: float = READY_TIMEOUT_S) -> bool:
-        """Return when the helper stands by, or False when it does not get there.
+        """Return when the helper is ready, or False when it does not get there.
 
         Args:
             timeout_s: how long it may take [s].
@@ -106,7 +106,7 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
 
 
 def main() -> int:
-    """Stand by; then open, disable, close."""
+    """Be ready; then open, disable, close."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd tells all at once; the supervisor's end is the end of this
     parser = argparse.ArgumentParser()
     parser.add_argument("--config", type=int, required=True)

@@ -19,18 +19,18 @@ SETTLE_S = 1.0
 """From something being plugged in to the try: udev has to give it its rights first [s]."""
 
 STEADY_S = 60.0
-"""A device that has been there for so long is looked for as if it were lost for the first time [s]."""
+"""A device that has been there for this long is looked for as if it were lost for the first time [s]."""
 
 
 class Recovery:
-    """Starts control processes until one has the device again.
+    """Starts loops until one has the device again.
 
     Attributes:
         lost: the device is being looked for.
         lost_s: since when, on CLOCK_MONOTONIC [s].
         next_try_s: when the next try is due; of one under way, when it began [s].
         why: why the last try failed, or why the device was lost.
-        resume: what the next control process goes on from.
+        resume: what the next loop goes on from.
     """
 
     def __init__(self) -> None:
@@ -61,11 +61,11 @@ class Recovery:
         self._put_off(why)
 
     def turn(self, lost: LoopProcess, config: LoadedConfig) -> LoopProcess | None:
-        """Go on looking; returns at once. The control process that has the device, once there is one.
+        """Go on looking; returns at once. The loop that has the device, once there is one.
 
         Args:
             lost: the process that lost it, which has to end first.
-            config: what the next one shall run.
+            config: what the next one is to run.
         """
         if lost.exit_code is None:
             if lost.stalled():  # in a driver that cannot let go of a device that is gone
@@ -93,7 +93,7 @@ class Recovery:
         return control
 
     def amend(self, resume: ResumeState) -> None:
-        """Change what the next control process goes on from, also when it is already on its way.
+        """Change what the next loop goes on from, also when it is already on its way.
 
         What changes nothing costs no try: who says `clear` again and again would keep the device away.
         """

@@ -1,4 +1,4 @@
-"""What a running daemon is made of, for the parts that act on it: the configuration, the loop, who is told."""
+"""What a running daemon is made of, for the parts that act on it: the configuration, the loop, who hears of what."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class DaemonState:
 
     Attributes:
         config: what is in force.
-        loop: the control process that has the device, or had it last.
+        loop: the process that has the device, or had it last.
         requests: what the loop is asked.
         recovery: looks for a device that is lost.
         publisher: telemetry.
         commands: the control socket.
         status: counts, and the status made of them.
-        event_log: who is told of events.
+        event_log: tells of events.
         notifier: tells systemd.
         reload_asked: answers to those who asked for a reload that has not begun.
         stop_reason: why the daemon is to end; "" as long as it is not.
@@ -70,7 +70,7 @@ class DaemonState:
         self.status_due_s = 0.0
 
     def take_loop(self, loop: LoopProcess) -> None:
-        """Go on with the control process that has found the device again."""
+        """Go on with the loop that has found the device again."""
         self.loop.close()
         self.loop = loop
         self.requests = RequestQueue(loop.shared)

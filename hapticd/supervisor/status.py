@@ -99,7 +99,7 @@ class StatusBuilder:
 
         Args:
             config: what is in force.
-            loop: the control process.
+            loop: the process of the loop.
             recovery: knows whether there is a device.
             fault_records: written so far.
             problem: what stands and should be known, a line; "" when there is nothing.

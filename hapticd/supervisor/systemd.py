@@ -65,7 +65,7 @@ def log_handler(path: str = SOCKET) -> logging.Handler:
 class JournalHandler(logging.Handler):
     """Sends records to the journal in its native protocol: one datagram a record, `FIELD=value` a line.
 
-    A journal that is away or busy is not waited for: whoever logs here also drains the ring.
+    A journal that is away or busy is not waited for: the thread that logs also drains the ring.
 
     Args:
         path: the journal's socket.

@@ -1,4 +1,4 @@
-"""The terminal that a daemon was started at: when it is closed, whoever had the daemon before their eyes is gone."""
+"""The terminal that a daemon was started at: when it is closed, the person at it is gone."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import signal
 
 
 class Terminal:
-    """Where this process was started. Made before anything handles SIGHUP: `nohup` means that it shall outlive it."""
+    """Where this process was started. Made before anything handles SIGHUP: `nohup` means that it is to outlive it."""
 
     def __init__(self) -> None:
         self._matters = _is_there() and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN

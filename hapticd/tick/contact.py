@@ -130,7 +130,7 @@ class Contact:
         self.tick.applied_n = self.tick.applied_contact_n = 0.0
 
     def snapshot(self, velocity_m_per_s: float) -> LawSnapshot:
-        """What a law is told that takes over now.
+        """What a law that takes over now starts from.
 
         Args:
             velocity_m_per_s: velocity of the wall's axis [m/s].

@@ -39,7 +39,7 @@ class EventCode(enum.IntEnum):
     SUBSCRIBER_FLOOD = 304
     DEVICE_WARNING = 305
     CALIBRATION_ENDED = 306
-    NOBODY_STANDS_BY = 307
+    HELPER_MISSING = 307
 
 
 @dataclass(slots=True)

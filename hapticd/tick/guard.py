@@ -159,7 +159,7 @@ class Guard:
             ConfigError: the simulation profile on a real device, or a limit above the device's own.
         """
         goal_n, goal_axis_n, self.max_speed_m_per_s = limits(safety, info)
-        # Coming down, what nobody uses of a limit goes at once, and what is in use by the ramp. A limit counts before
+        # Coming down, what is not in use of a limit goes at once, and what is in use by the ramp. A limit counts before
         # the gain of a release.
         used_n = [newton / self.gain for newton in force_n] if self.gain > 0.0 else [0.0]
         self.max_force_n = min(self.max_force_n, max(goal_n, math.hypot(*used_n)))

@@ -83,7 +83,7 @@ class Motion:
         self._waited_s = 0.0
 
     def start(self, sample: Sample) -> bool:
-        """Begin at a sample, at rest; False when it makes no sense, and nobody knows where the device is."""
+        """Begin at a sample, at rest; False when it makes no sense, and it is not known where the device is."""
         self._time_ns = sample.time_ns
         self._sequence = sample.sequence
         # A NaN is nowhere.

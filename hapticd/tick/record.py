@@ -98,7 +98,7 @@ _UNCALIBRATED = int(Flag.UNCALIBRATED)
 
 
 class RecordLayout:
-    """Where the fields of a record lie, for a device with so many axes.
+    """Where the fields of a record lie, for a device with `axes` axes.
 
     First the scalars in the order of `TickRecord` and the number of walls, then the axes, the orientation and the
     walls.

@@ -141,7 +141,7 @@ class ControlTick:
         return True
 
     def tare(self) -> bool:
-        """Count positions from here on. False while forces are let through or nobody knows where the device is."""
+        """Count positions from here on. False while forces are let through or it is not known where the device is."""
         if self._blind or self.guard.mode is not Mode.DISARMED:
             return False
         motion = self.motion
@@ -200,7 +200,7 @@ class ControlTick:
         self.guard.release(self.ramp_s if ramp_s is None else ramp_s)
 
     def fail(self, code: EventCode, text: str) -> None:
-        """Stop because of a fault: ramp the force to zero and latch. The same fault is told once until cleared."""
+        """Stop because of a fault: ramp the force to zero and latch. The same fault is reported once until cleared."""
         if not self.fault and not (self.guard.latched and code == self._last_fault):
             self.fault = self._last_fault = code
             self.fault_text = text
@@ -315,7 +315,7 @@ class ControlTick:
         return force_n
 
     def _see_again(self) -> None:
-        """Positions make sense again: stand there, at rest and without force; if armed meanwhile, come in by a ramp."""
+        """Positions make sense again: stand there, at rest and without force; if armed by then, come in by a ramp."""
         self._blind = False
         for contact in self._active:
             contact.start(self.motion.position_m[contact.wall.axis])

@@ -13,12 +13,13 @@ import pytest
 
 from hapticd.errors import HapticdError, RealtimeError
 from hapticd.measure import MachineWatch, Quantiles, Verdict, doubtful
-from hapticd_bench import lateness
-from hapticd_bench.lateness import Block, Cell, Load, Loop
+from hapticd_bench import lateness, lateness_block
+from hapticd_bench.lateness import Cell
+from hapticd_bench.lateness_block import Block, Load, Loop
 from hapticd_bench.threaded import serve_threaded
 from hapticd_bench.tick import RecordedLoop, scene, serve_daemon
 
-MS = lateness.PERIOD_NS
+MS = lateness_block.PERIOD_NS
 needs_compiler = pytest.mark.skipif(shutil.which(os.environ.get("CC", "cc")) is None, reason="no C compiler")
 
 
@@ -86,7 +87,7 @@ class TestJoin:
         """The first 0.3 s of the witness are left out, and what comes after the measuring time."""
         witness = record([20.0] * 1700, first=1000)
         loop = record([30.0] * 3000, first=0)
-        cut = lateness.cut(loop, witness, dict.fromkeys(loop, 14.0), seconds=1.0)
+        cut = lateness_block.cut(loop, witness, dict.fromkeys(loop, 14.0), seconds=1.0)
         assert (min(cut.late_us), max(cut.late_us)) == (1300 * MS, 2299 * MS)
         assert len(cut.late_us) == len(cut.witness_us) == len(cut.busy_us) == 1000
         assert (cut.loop_skipped, cut.witness_skipped) == (0, 0)
@@ -94,11 +95,11 @@ class TestJoin:
     def test_skipped_deadlines_are_counted_in_that_time(self) -> None:
         witness = record([20.0] * 1700, first=0)
         loop = {deadline: late for deadline, late in record([30.0] * 1700).items() if not 400 <= deadline // MS < 410}
-        assert lateness.cut(loop, witness, {}, seconds=1.0).loop_skipped == 10
+        assert lateness_block.cut(loop, witness, {}, seconds=1.0).loop_skipped == 10
 
     def test_a_loop_that_came_too_late_is_an_error_and_not_a_result(self) -> None:
         with pytest.raises(HapticdError, match="was not there"):
-            lateness.cut(record([30.0] * 10, first=2000), record([20.0] * 1700), {}, seconds=1.0)
+            lateness_block.cut(record([30.0] * 10, first=2000), record([20.0] * 1700), {}, seconds=1.0)
 
 
 class TestBars:
@@ -191,7 +192,7 @@ def test_every_cell_gets_as_many_blocks() -> None:
 
 @pytest.fixture(scope="module")
 def witness(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return lateness.compile_witness(tmp_path_factory.mktemp("witness"))
+    return lateness_block.compile_witness(tmp_path_factory.mktemp("witness"))
 
 
 @needs_compiler
@@ -203,7 +204,7 @@ class TestWitness:
                 [witness, str(cpu), "0", "60", tmp_path / name], capture_output=True, text=True, check=True
             )
             assert done.stdout == "ready\n"
-            pairs = lateness.read_pairs(tmp_path / name)
+            pairs = lateness_block.read_pairs(tmp_path / name)
             assert len(pairs) == 60
             assert all(deadline % MS == 0 for deadline in pairs)
             assert all(late_us >= 0.0 for late_us in pairs.values())
@@ -214,19 +215,19 @@ class TestWitness:
         refusing.write_text("#!/bin/sh\necho 'sched_setscheduler: Operation not permitted' >&2\nexit 1\n")
         refusing.chmod(0o755)
         with pytest.raises(RealtimeError, match="CAP_SYS_NICE") as refused:
-            lateness.check_rights(refusing, 0)
+            lateness_block.check_rights(refusing, 0)
         assert refused.value.exit_code == 1
         assert "sched_setscheduler" in str(refused.value)
 
     def test_a_processor_that_is_not_there_is_named_by_the_witness(self, witness: Path) -> None:
         with pytest.raises(RealtimeError, match="sched_setaffinity"):
-            lateness.check_rights(witness, 1000)
+            lateness_block.check_rights(witness, 1000)
 
 
 def test_without_a_compiler_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(HapticdError, match="apt install gcc"):
-        lateness.compile_witness(tmp_path)
+        lateness_block.compile_witness(tmp_path)
 
 
 @pytest.mark.parametrize("serve", [serve_daemon, serve_threaded])

@@ -243,7 +243,7 @@ def test_that_nobody_stands_by_to_release_the_device_is_told_and_the_loop_goes_o
     with Rig() as rig, rig.pressed().subscriber() as subscriber:
         assert subscriber.until("hapticd/status")["warnings"] == []
         os.kill(helper_of(rig), signal.SIGKILL)
-        event = subscriber.until("hapticd/event", code=EventCode.NOBODY_STANDS_BY)
+        event = subscriber.until("hapticd/event", code=EventCode.HELPER_MISSING)
         status = subscriber.until("hapticd/status")
         assert status["warnings"][0] == event["text"]
         assert (status["armed"], status["fault_code"]) == (True, 0)

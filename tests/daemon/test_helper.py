@@ -28,6 +28,6 @@ def test_a_daemon_without_its_helper_runs_and_says_so(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text(WITNESS.replace("HELPER", "raise SystemExit(1)"))
     with Daemon(PRESSED, pythonpath=tmp_path).wait_ready() as daemon, Subscriber(daemon.endpoint) as subscriber:
         pressing(daemon)
-        assert daemon.output().count("nobody stands by") == 1
+        assert daemon.output().count("no helper is ready") == 1
         warnings = subscriber.until("hapticd/status", armed=True)["warnings"]
-        assert any("nobody stands by" in warning for warning in warnings)
+        assert any("no helper is ready" in warning for warning in warnings)

@@ -31,7 +31,7 @@ _KINDS = {float: np.float64, int: np.int64, bool: np.bool_}
 
 
 def record_dtype(fields: Mapping[str, type[Scalar]]) -> np.dtype[Any]:
-    """The record with these fields; one that has none gets one that nobody uses, since a record needs a size."""
+    """The record with these fields; one that has none gets one that is not used, since a record needs a size."""
     named = [(name, _KINDS[kind]) for name, kind in fields.items()] or [("unused", np.float64)]
     return np.dtype(named, align=True)
 

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 PIECES_PER_THREAD = 4
-"""Items do not all take the same time: whoever is done with a piece early takes another. Each costs 0.2 ms to begin."""
+"""Items do not all take the same time: a thread that is done early takes another. Each costs 0.2 ms to begin."""
 
 
 def cores() -> int:

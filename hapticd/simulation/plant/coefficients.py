@@ -34,7 +34,7 @@ MOST_GROWTH = 100.0
 """An active device may grow e^100-fold in a period: what a step makes of it is still a number."""
 
 MOST_TURNS = 1e5
-"""The spring of the hand may swing so many times in a period: 1e-16 of an angle each time, and the phase is known."""
+"""The spring of the hand may swing this many times in a period: 1e-16 of an angle each time, and the phase is known."""
 
 LONGEST_PERIOD_S = 1e6
 
