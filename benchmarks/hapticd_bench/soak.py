@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hapticd.client import Client, Event, Timing, connect
+from hapticd.client import Client, Event, Timing
 from hapticd.config.loading import load
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.measure import Bar, Progress, Quantiles
@@ -131,11 +131,11 @@ def measure(config: Path, duration_s: float, interval_s: float, progress: Progre
     with (
         tempfile.TemporaryDirectory(prefix="hapticd-soak-") as directory,
         running_daemon(config, Path(directory)) as daemon,
-        connect(daemon.endpoint, topics=(Timing, Event), receive_high_water=0) as client,
+        Client(daemon.endpoint, topics=(Timing, Event), receive_high_water=0) as client,
     ):
         faults: list[str] = []
         looks = tuple(_looks(client, daemon, loop.period_ns, duration_s, interval_s, faults, progress))
-        dropped = client.status.ring_drops if client.status else 0
+        dropped = client.latest_status.ring_drops if client.latest_status else 0
     return Soak(loop.rate_hz, looks, dropped, tuple(faults), tuple(_bars(looks, dropped, len(faults))))
 
 

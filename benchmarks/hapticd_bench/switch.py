@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from hapticd.client import Client, Event, Timing, connect
+from hapticd.client import Client, Event, Timing
 from hapticd.measure import Progress, Quantiles
 from hapticd.tick.event import EventCode
 from hapticd_bench.running import RunningDaemon, running_daemon
@@ -113,7 +113,7 @@ def _switch(burners: int) -> tuple[float, float]:
         config.write_text(CONFIG.format(cpu=cpu, law="energy-cycle"))
         with (
             running_daemon(config, directory) as daemon,
-            connect(daemon.endpoint, topics=(Timing, Event), receive_high_water=0) as client,
+            Client(daemon.endpoint, topics=(Timing, Event), receive_high_water=0) as client,
         ):
             _ticks(daemon, client, 1)
             with _busy(cpu, burners):

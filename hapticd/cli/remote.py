@@ -11,11 +11,9 @@ from typing import Annotated
 
 import typer
 
+from hapticd.client import commands
 from hapticd.client.commands import command
 from hapticd.paths import DEFAULT_INSTANCE
-
-CALIBRATION_TIMEOUT_S = 120.0
-"""How long a device may take to calibrate [s]."""
 
 Instance = Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.")]
 Connect = Annotated[
@@ -98,15 +96,14 @@ def calibrate(
 
     Example: hapticd calibrate --countdown 10
     """
-    command("status", instance, connect=connect, keys=keys)  # nobody clears a workspace for a daemon that is not there
+    command("status", instance, connect=connect, keys=keys)  # first: is there a daemon?
     for left_s in range(countdown_s, 0, -1):
         typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
         time.sleep(1.0)
     typer.echo("calibrating", err=True)
     try:
-        command("calibrate", instance, CALIBRATION_TIMEOUT_S, connect, keys)
+        commands.calibrate(instance, connect, keys)
     except KeyboardInterrupt:
-        command("disarm", instance, connect=connect, keys=keys)
         typer.echo("called off", err=True)
         raise
 

@@ -1,31 +1,41 @@
-"""Read a daemon's telemetry.
+"""Watch and command a running daemon.
 
     from hapticd.client import Cycle, Gap, connect
 
-    with connect(topics=[Cycle]) as client:
-        for record in client:
+    with connect(topics=[Cycle]) as daemon:
+        daemon.arm()
+        for record in daemon:
             print(record)
 
-The contract behind it is docs/telemetry.md; any language with ZeroMQ and msgpack can read the same.
+`connect` is the one way in, the same as `hapticd.connect`. `Client` is the subscription below it, for a program that
+starts before its daemon. The contract behind both is docs/telemetry.md; any language with ZeroMQ and msgpack can do
+the same.
 """
 
-from hapticd.client.connection import Client, connect
+from hapticd.client.commands import RefusedConfigError, RefusedError
+from hapticd.client.connection import Client
+from hapticd.client.daemon import DaemonClient, connect
 from hapticd.client.decode import decode
 from hapticd.errors import ClientError, SchemaError, SilenceError, WireError
 from hapticd.keys.client import RefusedKeyError
 from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Status, Timing
+from hapticd.tick.event import EventCode
 
 __all__ = [
     "Client",
     "ClientError",
     "Cycle",
+    "DaemonClient",
     "Damping",
     "Energy",
     "Event",
+    "EventCode",
     "Gap",
     "Input",
     "Position",
     "Record",
+    "RefusedConfigError",
+    "RefusedError",
     "RefusedKeyError",
     "SchemaError",
     "SilenceError",

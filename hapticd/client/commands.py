@@ -15,6 +15,9 @@ from hapticd.paths import CONTROL, DEFAULT_INSTANCE, locate
 TIMEOUT_S = 5.0
 """How long a daemon may take to answer [s]."""
 
+CALIBRATION_TIMEOUT_S = 120.0
+"""How long a device may take to calibrate [s]."""
+
 
 class RefusedError(HapticdError):
     """The daemon understood the request and refused it; the message says why."""
@@ -62,19 +65,38 @@ def command(
     advice = "is it its control.tcp?" if connect else "start it with `hapticd run`, or name its --instance"
     context = zmq.Context()
     socket = context.socket(zmq.DEALER)
-    visit = CurveClient(socket, endpoint, own)
+    connection = CurveClient(socket, endpoint, own)
     try:
-        visit.connect()
+        connection.connect()
         socket.send(msgpack.packb({"do": do, **fields}))
-        if not visit.wait(timeout_s):
-            raise InstanceError(f"no daemon answers on {endpoint}{visit.doubt or f': {advice}'}")
+        if not connection.wait(timeout_s):
+            raise InstanceError(f"no daemon answers on {endpoint}{connection.doubt or f': {advice}'}")
         answer: dict[str, Any] = msgpack.unpackb(socket.recv())
     except zmq.ZMQError as error:
         why = zmq.strerror(error.errno or 0)
         raise InstanceError(f"{endpoint}: {why}; an endpoint is tcp://HOST:PORT or ipc://PATH") from error
     finally:
-        visit.close()
+        connection.close()
         context.term()
     if not answer["ok"]:
         raise (RefusedConfigError if do == "reload" else RefusedError)(answer["text"])
     return answer
+
+
+def calibrate(instance: str = DEFAULT_INSTANCE, connect: str | None = None, keys: Path | None = None) -> None:
+    """Calibrate the device, which moves its arm by itself; an interrupt calls it off.
+
+    Args:
+        instance: which daemon on this computer, when no endpoint is given.
+        connect: the daemon's `control.tcp` as seen from here.
+        keys: key file for it; None: the one that $HAPTICD_KEYS names.
+
+    Raises:
+        ConfigError, InstanceError, RefusedKeyError, RefusedError: as `command`.
+        KeyboardInterrupt: it was called off.
+    """
+    try:
+        command("calibrate", instance, CALIBRATION_TIMEOUT_S, connect, keys)
+    except KeyboardInterrupt:
+        command("disarm", instance, connect=connect, keys=keys)
+        raise

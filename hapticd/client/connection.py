@@ -4,33 +4,33 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self, TypeVar, overload
 
 import zmq
 
 from hapticd.client.decode import decode
 from hapticd.errors import ClientError, SchemaError, SilenceError, WireError
 from hapticd.keys.client import CurveClient, client_keys
-from hapticd.keys.file import Key
 from hapticd.paths import DEFAULT_INSTANCE, telemetry_endpoint
-from hapticd.telemetry.records import Gap, Record, Sent, Status
+from hapticd.telemetry.records import Event, Gap, Record, Sent, Status
 from hapticd.telemetry.wire import SCHEMA, Topic
 
 _EVERY_TICK = (Topic.POSITION, Topic.ENERGY, Topic.DAMPING, Topic.TIMING)
 _LARGEST_MESSAGE = 16 * 1024 * 1024
 
+Kind = TypeVar("Kind", bound=Sent)
+"""A record class."""
 
-def connect(
-    endpoint: str | None = None,
-    instance: str = DEFAULT_INSTANCE,
-    topics: Sequence[type[Sent] | Topic | str] = tuple(Topic),
-    timeout_s: float | None = None,
-    receive_high_water: int = 1000,
-    keys: Path | str | None = None,
-) -> Client:
-    """Subscribe to a daemon. It need not run yet, and may be restarted: ZeroMQ connects again by itself.
+
+class Client:
+    """A subscription: an iterable of records. `connect` gives one that commands as well.
+
+    The daemon need not run yet, and may be restarted: ZeroMQ connects again by itself. Records are yielded once the
+    daemon's first status has arrived and its schema is known. Ticks that are missing are yielded as a `Gap`. One
+    thread at a time may use it.
 
     Args:
         endpoint: for example "tcp://lab.example:9872"; None: the instance's own on this computer.
@@ -40,55 +40,51 @@ def connect(
         receive_high_water: messages kept while the caller is busy; new ones are lost beyond it.
         keys: key file for a daemon on another computer; None: the one that $HAPTICD_KEYS names, if any.
 
+    Attributes:
+        endpoint: what it is connected to.
+        latest_status: of the daemon, None before the first, whether or not that topic was asked for.
+        missing: ticks that did not arrive, by topic.
+
     Raises:
         ClientError: no such topic, or ZeroMQ cannot use the endpoint.
         ConfigError: the key file cannot be used.
     """
-    where = endpoint or telemetry_endpoint(instance)
-    return Client(where, topics, timeout_s, receive_high_water, client_keys(where, keys))
-
-
-class Client:
-    """An iterable of records; made by `connect`.
-
-    Records are yielded once the daemon's first status has arrived and its schema is known. Ticks that are
-    missing are yielded as a `Gap`.
-
-    Attributes:
-        endpoint: what it is connected to.
-        status: latest status of the daemon, None before the first, whether or not that topic was asked for.
-        missing: ticks that did not arrive so far, by topic.
-    """
 
     def __init__(
         self,
-        endpoint: str,
-        topics: Sequence[type[Sent] | Topic | str],
-        timeout_s: float | None,
-        receive_high_water: int,
-        keys: Key | None = None,
+        endpoint: str | None = None,
+        *,
+        instance: str = DEFAULT_INSTANCE,
+        topics: Sequence[type[Sent] | Topic | str] = tuple(Topic),
+        timeout_s: float | None = None,
+        receive_high_water: int = 1000,
+        keys: Path | str | None = None,
     ) -> None:
-        self.endpoint = endpoint
-        self.status: Status | None = None
+        self.endpoint = endpoint or telemetry_endpoint(instance)
+        self.latest_status: Status | None = None
         self.missing: dict[Topic, int] = dict.fromkeys(_EVERY_TICK, 0)
         self._topics = frozenset(_topic(topic) for topic in topics)
         self._timeout_s = timeout_s
+        self._ahead: deque[Record] = deque()  # arrived with what was asked for, and not yet taken
         self._last: dict[Topic, int] = {}
+        key = client_keys(self.endpoint, keys)
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.SUB)
-        self._visit = CurveClient(self._socket, endpoint, keys)
+        self._connection = CurveClient(self._socket, self.endpoint, key)
         try:
             self._socket.setsockopt(zmq.LINGER, 0)
             self._socket.setsockopt(zmq.RCVHWM, receive_high_water)
             self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_MESSAGE)
             for topic in self._topics | {Topic.STATUS}:
                 self._socket.setsockopt_string(zmq.SUBSCRIBE, topic)
-            self._visit.connect()
+            self._connection.connect()
         except zmq.ZMQError as error:
             self.close()
-            raise ClientError(f"{endpoint}: {error.strerror}; an endpoint is ipc://PATH or tcp://HOST:PORT") from error
+            raise ClientError(
+                f"{self.endpoint}: {error.strerror}; an endpoint is ipc://PATH or tcp://HOST:PORT"
+            ) from error
 
-    def __enter__(self) -> Client:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -106,7 +102,9 @@ class Client:
             if not records:
                 doubt = self.doubt or "; is the daemon running there?"
                 raise SilenceError(f"{self.endpoint}: nothing for {self._timeout_s:g} s{doubt}")
-            yield from records
+            self._ahead.extend(records)
+            while self._ahead:
+                yield self._ahead.popleft()
 
     def receive(self, timeout_s: float | None = 0.0) -> list[Record]:
         """The records of the next message that has some; empty when none came in time.
@@ -115,28 +113,76 @@ class Client:
             timeout_s: how long to wait for it [s]; None: for ever.
 
         Raises:
-            RefusedKeyError: the daemon lets only those in whose keys it lists.
+            RefusedKeyError: the daemon does not list this key.
             SchemaError: the daemon's schema is not known to this client.
-            WireError: somebody sends what the contract does not allow.
+            WireError: a message is not what the contract says.
         """
-        until = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        if self._ahead:
+            records = list(self._ahead)
+            self._ahead.clear()
+            return records
+        deadline_s = _deadline_s(timeout_s)
+        while (message := self._message(deadline_s)) is not None:
+            if message:
+                return message
+        return []
+
+    @overload
+    def wait_for(self, wanted: int, *, timeout_s: float | None = None) -> Event: ...
+
+    @overload
+    def wait_for(
+        self, wanted: type[Kind], where: Callable[[Kind], bool] | None = None, *, timeout_s: float | None = None
+    ) -> Kind: ...
+
+    def wait_for(
+        self, wanted: int | type[Any], where: Callable[[Any], bool] | None = None, *, timeout_s: float | None = None
+    ) -> Any:
+        """The next record that fits; those before it are passed over.
+
+        Args:
+            wanted: the code of an event, such as `EventCode.ARMED`, or a record class.
+            where: what is true of the record; None: any of its class.
+            timeout_s: how long to wait for it [s]; None: for ever.
+
+        Raises:
+            ClientError: its topic is not among those asked for.
+            SilenceError: it did not come in time.
+            RefusedKeyError, SchemaError, WireError: as `receive`.
+        """
+        kind = Event if isinstance(wanted, int) else wanted
+        name = f"event {int(wanted)}" if isinstance(wanted, int) else kind.__name__
+        if kind.topic not in self._topics:
+            raise ClientError(f"{name}: cannot be waited for without its topic; add {kind.__name__} to the topics")
+        deadline_s = _deadline_s(timeout_s)
         while True:
-            left_s = until - time.monotonic()
-            if not self._visit.wait(None if left_s == math.inf else left_s):
-                return []
-            records = self._accept(self._socket.recv_multipart())
-            if records:
-                return records
+            while self._ahead:
+                record = self._ahead.popleft()
+                if not isinstance(record, kind) or (isinstance(wanted, int) and record.code != wanted):
+                    continue
+                if where is None or where(record):
+                    return record
+            message = self._message(deadline_s)
+            if message is None:
+                raise SilenceError(f"{self.endpoint}: {name} did not come within {timeout_s:g} s{self.doubt}")
+            self._ahead.extend(message)
 
     @property
     def doubt(self) -> str:
-        """What is wrong with whoever answers at the endpoint, to be put behind a statement; empty when nothing is."""
-        return self._visit.doubt
+        """What is wrong with what answers at the endpoint, to be put behind a statement; empty when nothing is."""
+        return self._connection.doubt
 
     def close(self) -> None:
         """Disconnect. May be called twice."""
-        self._visit.close()
+        self._connection.close()
         self._context.term()
+
+    def _message(self, deadline_s: float) -> list[Record] | None:
+        """The records of the next message, which may have none; None when no message came in time."""
+        left_s = deadline_s - time.monotonic()
+        if not self._connection.wait(None if left_s == math.inf else left_s):
+            return None
+        return self._accept(self._socket.recv_multipart())
 
     def _accept(self, frames: list[bytes]) -> list[Record]:
         if len(frames) != 2:
@@ -146,7 +192,7 @@ class Client:
         for record in records:
             if isinstance(record, Status):
                 self._learn(record)
-            if self.status is None or record.topic not in self._topics:
+            if self.latest_status is None or record.topic not in self._topics:
                 continue
             if record.topic in _EVERY_TICK:
                 accepted.extend(self._gap(record.topic, record.seq))
@@ -159,14 +205,14 @@ class Client:
                 f"{self.endpoint}: hapticd {status.version} there speaks schema {status.schema}, this "
                 f"client {SCHEMA}; install the release that the daemon runs"
             )
-        if self.status is not None and status.every_ticks != self.status.every_ticks:
+        if self.latest_status is not None and status.every_ticks != self.latest_status.every_ticks:
             self._last.clear()
-        self.status = status
+        self.latest_status = status
 
     def _gap(self, topic: Topic, seq: int) -> list[Gap]:
         last = self._last.get(topic)
         self._last[topic] = seq
-        step = self.status.every_ticks if self.status is not None else 1
+        step = self.latest_status.every_ticks if self.latest_status is not None else 1
         if last is None or seq == last + step:
             return []
         missing = max(0, (seq - last) // step - 1) if seq > last else 0
@@ -174,6 +220,10 @@ class Client:
             return []
         self.missing[topic] += missing
         return [Gap(topic, last, seq, missing)]
+
+
+def _deadline_s(timeout_s: float | None) -> float:
+    return math.inf if timeout_s is None else time.monotonic() + timeout_s
 
 
 def _topic(topic: type[Any] | Topic | str) -> Topic:

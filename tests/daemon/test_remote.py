@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.client import Position, RefusedKeyError, connect
+from hapticd.client import Client, Position, RefusedKeyError
 from hapticd.keys.file import new_pair, write
 from hapticd.keys.store import KeyDirectory
 from hapticd.tick.event import EventCode
@@ -139,8 +139,8 @@ def test_from_another_computer_a_listed_key_watches_and_commands_and_nobody_else
 
 def test_a_removed_key_is_shut_out_at_the_next_reload_and_the_others_go_on(remote: Remote) -> None:
     with (
-        connect(remote.telemetry, topics=[Position], keys="laptop.key_secret") as laptop,
-        connect(remote.telemetry, topics=[Position], timeout_s=PATIENCE_S, keys="wall.key_secret") as wall,
+        Client(remote.telemetry, topics=[Position], keys="laptop.key_secret") as laptop,
+        Client(remote.telemetry, topics=[Position], timeout_s=PATIENCE_S, keys="wall.key_secret") as wall,
     ):
         assert laptop.receive(PATIENCE_S)
         assert wall.receive(PATIENCE_S)

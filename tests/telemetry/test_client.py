@@ -31,7 +31,6 @@ from hapticd.client import (
     Status,
     Timing,
     WireError,
-    connect,
     decode,
 )
 from hapticd.telemetry.wire import Topic, new_packer
@@ -46,9 +45,9 @@ EVERY_TICK = (Position, Energy, Damping, Timing)
 def heard(wire: Wire, *topics: Any) -> Iterator[Client]:
     """A client that has its first status, so that nothing published from now on passes it by."""
     before = served(wire.publisher)
-    with connect(wire.endpoint, topics=topics or tuple(Topic), timeout_s=PATIENCE_S) as client:
+    with Client(wire.endpoint, topics=topics or tuple(Topic), timeout_s=PATIENCE_S) as client:
         joined(client, wire, before + len(client._topics | {Topic.STATUS}))
-        wait_until(lambda: client.receive(0.0) == [] and client.status is not None, "the status")
+        wait_until(lambda: client.receive(0.0) == [] and client.latest_status is not None, "the status")
         yield client
 
 
@@ -102,8 +101,8 @@ def test_a_status_comes_back_as_the_supervisor_filled_it_in() -> None:
     with Wire(say_status=False) as wire:
         wire.publisher.status(status.as_map())
         with heard(wire, "status") as client:
-            assert client.status is not None
-            assert dataclasses.replace(client.status, timestamp=0.0) == status
+            assert client.latest_status is not None
+            assert dataclasses.replace(client.latest_status, timestamp=0.0) == status
 
 
 def test_topics_are_asked_for_by_class_or_by_name() -> None:
@@ -111,7 +110,7 @@ def test_topics_are_asked_for_by_class_or_by_name() -> None:
         wire.publisher.publish(ticks(200))
         wire.publisher.event(contract.LoopEvent(101, "armed", 0, 0))
         assert [type(one) for one in take(client, 2)] == [Cycle, Event]
-        assert client.status is not None  # always known, yielded only when asked for
+        assert client.latest_status is not None  # always known, yielded only when asked for
 
 
 @pytest.mark.parametrize(("every_ticks", "lost", "missing"), [(1, range(140, 160), 20), (10, range(100, 160), 6)])
@@ -177,7 +176,7 @@ def test_a_restarted_daemon_is_found_again_and_counts_anew() -> None:
 def test_a_client_may_come_before_the_daemon() -> None:
     with Wire() as wire:
         wire.publisher.close()
-        with connect(wire.endpoint, topics=[Position], timeout_s=PATIENCE_S) as client:
+        with Client(wire.endpoint, topics=[Position], timeout_s=PATIENCE_S) as client:
             assert client.receive(0.05) == []
             wire.restart()
             joined(client, wire, 2)
@@ -186,7 +185,7 @@ def test_a_client_may_come_before_the_daemon() -> None:
 
 
 def test_nothing_is_yielded_before_the_schema_is_known() -> None:
-    with Wire(say_status=False) as wire, connect(wire.endpoint, topics=[Position]) as client:
+    with Wire(say_status=False) as wire, Client(wire.endpoint, topics=[Position]) as client:
         joined(client, wire, 2)
         wire.publisher.publish(ticks(20))
         assert client.receive(0.05) == []
@@ -203,7 +202,7 @@ def test_another_schema_is_refused_with_both_versions() -> None:
 
 
 def test_silence_is_an_error_that_names_the_endpoint() -> None:
-    with Wire() as wire, connect(wire.endpoint, topics=[Position], timeout_s=0.05) as client:
+    with Wire() as wire, Client(wire.endpoint, topics=[Position], timeout_s=0.05) as client:
         with pytest.raises(SilenceError, match=r"telemetry: nothing for 0.05 s; is the daemon running there\?"):
             next(iter(client))
         assert client.receive() == []
@@ -282,9 +281,9 @@ def test_any_msgpack_is_records_or_an_error_in_one_line(topic: bytes, payload: A
 
 def test_misuse_is_told_before_anything_is_connected() -> None:
     with pytest.raises(ClientError, match="topic 'forces': not one of position, energy"):
-        connect("ipc:///nowhere", topics=["forces"])
+        Client("ipc:///nowhere", topics=["forces"])
     with pytest.raises(ClientError, match=r"an endpoint is ipc://PATH or tcp://HOST:PORT"):
-        connect("nonsense")
+        Client("nonsense")
 
 
 def test_what_a_device_does_not_have_is_not_in_its_input() -> None:

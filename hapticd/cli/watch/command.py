@@ -25,7 +25,7 @@ from rich.live import Live
 
 from hapticd.cli.remote import Instance, Keys
 from hapticd.cli.watch.screen import SILENT_S, ScreenState, frame, one_line
-from hapticd.client import Client, Event, Record, SilenceError, Status, connect
+from hapticd.client import Client, Event, Record, SilenceError, Status
 from hapticd.errors import HapticdError
 from hapticd.paths import DEFAULT_INSTANCE, telemetry_endpoint
 
@@ -174,7 +174,7 @@ class _Feed:
             self.drain(0.1)
 
     def _connect(self) -> Client:
-        return connect(self._given, self._instance, self._topics, keys=self._keys)
+        return Client(self._given, instance=self._instance, topics=self._topics, keys=self._keys)
 
 
 def _live(feed: _Feed, console: Console, stop: Callable[[], bool]) -> None:
