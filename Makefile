@@ -3,7 +3,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Stamps: what running needs is there; what tests need is there as well.
+READY_RUN := $(VENV)/.ready-run
 READY := $(VENV)/.ready
+PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
 
 # What tests and examples use besides Python; one list for this file, CI and the README.
 PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd-container debootstrap \
@@ -27,7 +30,7 @@ help:
 	@echo "make uninstall  all of that away again, except configurations and fault records"
 	@echo "make clean    remove the virtual environment and all that tools left"
 
-run: $(READY)
+run: $(READY_RUN)
 	$(BIN)/hapticd run --config config/hapticd.toml --watch
 
 # Most of the time is spent waiting for daemons that run in real time, so more workers than the two processors of CI; but
@@ -46,7 +49,7 @@ nightly: packages $(READY)
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
 
 bench: $(READY)
-	$(BIN)/hapticd bench
+	$(BIN)/hapticd bench tick
 
 install: own-place
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || .ci/packages python3-venv
@@ -68,14 +71,20 @@ own-place:
 packages:
 	@.ci/packages $(PACKAGES)
 
+$(READY_RUN): pyproject.toml | $(BIN)/python
+	$(PIP_INSTALL) .
+	@touch $@
+
+$(READY): pyproject.toml | $(BIN)/python
+	$(PIP_INSTALL) '.[dev]'
+	@touch $(READY_RUN) $@
+
 # Debian splits ensurepip off into python3-venv: without it venv fails, and .ci/packages fetches it or says how.
-$(READY): pyproject.toml
+$(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "hapticd needs Python 3.11 or newer; say which one: make PYTHON=python3.11 ..."; exit 1; }
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || .ci/packages python3-venv
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	@touch $@
 
 clean:
 	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
