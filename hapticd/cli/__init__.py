@@ -26,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(arguments: list[str]) -> int:
     try:
-        # These take so long that an interrupt may well come meanwhile.
+        # These imports take long enough for an interrupt to come.
         import typer
 
         from hapticd.cli.app import application

@@ -85,7 +85,7 @@ def devices(
 
 
 def _configured(config: Path | None) -> tuple[str, DriverOptions | None]:
-    """The configured driver and its options; a file that nobody asked for may be unusable."""
+    """The configured driver and its options; a file that was not named may be unusable."""
     try:
         loaded = load(config or default_config())
     except ConfigError:

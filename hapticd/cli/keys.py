@@ -165,13 +165,13 @@ def _file_of(name: str) -> Path:
 
 def _reminder() -> str:
     service = " or `sudo systemctl reload hapticd`" if os.geteuid() == 0 else ""
-    return f"a running daemon takes that up at `hapticd reload`{service}"
+    return f"a running daemon takes it over at `hapticd reload`{service}"
 
 
 def _next(pair: Key | None, clients: dict[str, Key]) -> list[str]:
     """What to do with what is there."""
     if pair is None:
-        lines = ["Nobody reaches the daemon from another computer. To allow it, make its keys:", "  hapticd keys make"]
+        lines = ["No other computer reaches the daemon. To allow it, make its keys:", "  hapticd keys make"]
         if os.geteuid() != 0:
             lines[1:] = [
                 "  sudo hapticd keys make     # for the system's service",
@@ -183,7 +183,7 @@ def _next(pair: Key | None, clients: dict[str, Key]) -> list[str]:
         f"  hapticd keys make NAME --server-key {shlex.quote(pair.public)}",
     ]
     if not clients:
-        return ["No client is listed, so nobody comes in. To let one in:", *client]
+        return ["No client is listed, so none comes in. To let one in:", *client]
     return [
         "To let another one in:",
         *client,

@@ -98,7 +98,7 @@ def _take_over(path: Path, before: str, after: str, instance: str) -> None:
     try:
         command("reload", instance, wait=True)
     except RefusedConfigError:
-        if after != before and read(path) == after:  # nobody else has edited it meanwhile
+        if after != before and read(path) == after:  # it was not edited again since
             replace(path, before)
             typer.echo(f"{path}: refused by the daemon; the file is as it was", err=True)
         raise

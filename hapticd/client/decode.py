@@ -1,4 +1,4 @@
-"""Messages into records; whatever does not keep to docs/telemetry.md is refused."""
+"""Messages into records; one that does not keep to docs/telemetry.md is refused."""
 
 from __future__ import annotations
 

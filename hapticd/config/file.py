@@ -1,4 +1,4 @@
-"""The configuration as a file: read whole, and replaced whole, so that nobody ever reads half of it."""
+"""The configuration as a file: read whole, and replaced whole, so that no reader gets half of it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def read(path: Path | str, *, files_only: bool = False) -> str:
 
     Args:
         path: the file.
-        files_only: refuse a pipe or a device, whose reader waits for whoever writes it.
+        files_only: refuse a pipe or a device, whose reader waits for a writer.
 
     Raises:
         ConfigError: it cannot be read, or is no text.

@@ -211,7 +211,7 @@ class ServiceConfig(Table):
 
 
 class FaultsConfig(Table):
-    """[faults]: what is kept of them."""
+    """[faults]: how many fault records are kept."""
 
     keep: int = Field(20, ge=0, le=1000, description="fault records kept, the oldest goes first; 0: none are written")
 

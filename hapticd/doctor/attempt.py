@@ -16,7 +16,7 @@ _TIMEOUT_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """How it went.
+    """Outcome of an attempt in a child process.
 
     Attributes:
         memory: error number of locking all memory, 0 when it could be done.

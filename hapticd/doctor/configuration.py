@@ -20,7 +20,7 @@ from hapticd.paths import directory
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the daemon would be asked for.
+    """What a configuration file asks of this computer.
 
     Attributes:
         path: the file.
@@ -50,7 +50,7 @@ class Wanted:
 
 
 def usable(wanted: Wanted) -> list[Finding]:
-    """What `hapticd check` says of it."""
+    """Whether the file can be used, as `hapticd check` says it."""
     if wanted.loaded is None and not wanted.path.exists():
         return [problem(line, f"cp {directory('config') / 'hapticd.toml'} {wanted.path}") for line in wanted.problems]
     if wanted.loaded is None:

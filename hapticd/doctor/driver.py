@@ -1,4 +1,4 @@
-"""What the configured driver itself says of this computer: nobody knows better where it looks and what will do."""
+"""What the configured driver itself says of this computer: it knows where it looks and what it needs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from hapticd.driver import Driver
 
 
 def needs(looked: Discovery) -> list[Finding]:
-    """What it has and lacks.
+    """What the driver needs on this computer, and what of it is missing.
 
     Args:
-        looked: its answer.
+        looked: the driver's answer.
     """
     found = [Finding(one.mark, one.text, one.mend) for one in looked.diagnoses]
     if looked.problem:
@@ -24,15 +24,15 @@ def needs(looked: Discovery) -> list[Finding]:
 
 
 def devices(looked: Discovery, daemon: int) -> list[Finding]:
-    """Which devices it finds, and whether this user can use one.
+    """Which devices the driver finds, and whether this user can use one.
 
     Args:
-        looked: its answer.
-        daemon: process of the running daemon, beside which nothing was looked for; 0 when there is none.
+        looked: the driver's answer.
+        daemon: process of the running daemon, which holds the device; 0 when there is none.
     """
     name = looked.driver
     if daemon:
-        return [ok("not looked for beside the running daemon, which has it: see hapticd watch")]
+        return [ok("not looked for: the running daemon has the device; see hapticd watch")]
     if looked.devices:
         usable = any(not device.problem for device in looked.devices)
         return [_state(device, name, usable) for device in looked.devices]
@@ -44,7 +44,7 @@ def devices(looked: Discovery, daemon: int) -> list[Finding]:
 
 
 def _state(device: FoundDevice, driver: str, usable: bool) -> Finding:
-    """One of them; what keeps this user from it matters less while there is another."""
+    """The finding for one device; an obstacle is mere advice while another device can be used."""
     what = " ".join(filter(None, (device.model, device.serial, device.where and f"({device.where})")))
     if not device.problem:
         return ok(f"{what}: {device.note}" if device.note else what)

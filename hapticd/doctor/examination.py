@@ -86,13 +86,13 @@ class Examination:
 
         Args:
             seconds: how long [s].
-            progress: told the share that is done.
+            progress: called with the share that is done.
         """
 
         def look() -> Finding:
             process = endpoints.running(runtime_directory(self.instance), self.root)
             if process:
-                return ok("not measured beside the running daemon, which it would delay: see hapticd watch")
+                return ok("not measured: it would delay the running daemon; see hapticd watch")
             self.latency = measure(self.wanted.loop, seconds, progress, self.root)
             return judge(self.latency)
 

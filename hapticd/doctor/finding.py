@@ -19,7 +19,7 @@ _PATH_UNDER_SUDO = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is so.
+    """What one check has found.
 
     Attributes:
         mark: `ok`; `advice`, the loop runs but could run better; `problem`, the loop runs badly or not at all;
@@ -53,27 +53,27 @@ class Check:
 
 
 def ok(text: str) -> Finding:
-    """All is well."""
+    """A finding: nothing to mend."""
     return Finding("ok", text)
 
 
 def advice(text: str, *mend: str) -> Finding:
-    """It could be better."""
+    """A finding: it could be better."""
     return Finding("advice", text, mend)
 
 
 def problem(text: str, *mend: str) -> Finding:
-    """It keeps the loop from running well."""
+    """A finding: it keeps the loop from running well."""
     return Finding("problem", text, mend)
 
 
 def unknown(reason: str, *mend: str) -> Finding:
-    """The check could not tell."""
+    """A finding: the check could not tell."""
     return Finding("unknown", f"could not tell: {reason}", mend)
 
 
 def examine(check: Check) -> list[Finding]:
-    """Make a check; whatever goes wrong in it becomes a finding."""
+    """Make a check; an error in it becomes a finding."""
     try:
         found = check.look()
         findings = [found] if isinstance(found, Finding) else list(found)

@@ -27,7 +27,7 @@ from hapticd.telemetry.records import LateHistogram
 GOOD_LATE = 0.1
 """Share of the period that p99 of lateness may take in a good loop."""
 BAD_LATE = 0.5
-"""And from which on it is none."""
+"""Share of the period from which on the loop is a bad one."""
 GOOD_SKIPPED = 0.001
 """Share of deadlines that a good loop may skip."""
 BAD_SKIPPED = 0.01
@@ -41,7 +41,7 @@ _START_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """What was measured.
+    """How late a child process woke at the daemon's deadlines.
 
     Attributes:
         rate_hz: of the deadlines [Hz].
@@ -51,8 +51,8 @@ class Latency:
         skipped: deadlines that were missed by a whole period.
         histogram: ticks in the bins of `hapticd/status`.
         virtual: the processors are those of a virtual machine.
-        stolen: processors that its host gave to somebody else meanwhile.
-        others: processors that other programs kept busy meanwhile.
+        stolen: processors that its host gave to others during that time.
+        others: processors that other programs kept busy during that time.
         rivals: other programs under real-time scheduling.
     """
 
@@ -69,7 +69,7 @@ class Latency:
 
     @property
     def skipped_share(self) -> float:
-        """Share of all deadlines."""
+        """Share of all deadlines that were skipped."""
         return self.skipped / max(1, self.skipped + self.late_us.count)
 
 
@@ -81,7 +81,7 @@ def measure(
     Args:
         loop: rate, priority and processor.
         seconds: how long [s].
-        progress: told the share that is done.
+        progress: called with the share that is done.
         root: the file system of /proc.
 
     Raises:
@@ -148,7 +148,7 @@ def judge(latency: Latency) -> Finding:
 
 
 def _doubts(latency: Latency) -> list[str]:
-    """What the figures do not say."""
+    """Reasons to doubt the figures."""
     doubts = []
     if not latency.realtime:
         doubts.append("measured without real-time rights")
@@ -158,7 +158,7 @@ def _doubts(latency: Latency) -> list[str]:
     if latency.others > _BUSY:
         doubts.append(f"other programs kept {latency.others:.1f} processors busy")
     if latency.rivals:
-        doubts.append(f"beside another real-time program: {latency.rivals[0]}")
+        doubts.append(f"another real-time program ran: {latency.rivals[0]}")
     if latency.late_us.count + latency.skipped < _ENOUGH_TICKS:
         doubts.append("too short to trust p99")
     return doubts

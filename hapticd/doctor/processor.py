@@ -100,7 +100,7 @@ def idle(root: Path = ROOT) -> Finding:
 
 
 def virtual(root: Path = ROOT) -> Finding:
-    """Whether somebody else decides when these processors run."""
+    """Whether a host decides when these processors run."""
     stolen = steal(root)
     shown = f", {stolen:.2%} of the time stolen since start" if stolen > _STEAL_NOTICED else ""
     if is_virtual(root):
@@ -125,7 +125,7 @@ def is_virtual(root: Path = ROOT) -> bool:
 
 
 def steal(root: Path = ROOT) -> float:
-    """Share of the processors' time that a host gave to somebody else.
+    """Share of the processors' time that a host gave to others.
 
     Raises:
         OSError: /proc does not tell.

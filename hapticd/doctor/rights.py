@@ -16,7 +16,7 @@ _IPC_LOCK = 14
 
 @dataclass(frozen=True, slots=True)
 class Rights:
-    """What this process was given.
+    """Real-time rights of a process.
 
     Attributes:
         rtprio: highest real-time priority without a capability.
@@ -32,7 +32,7 @@ class Rights:
 
     @classmethod
     def of_this_process(cls, root: Path = ROOT) -> Rights:
-        """Read them.
+        """Read the rights of this process.
 
         Raises:
             OSError: /proc does not tell.
@@ -48,7 +48,7 @@ class Rights:
         )
 
     def may_take(self, priority: int) -> bool:
-        """Whether a real-time priority is within them."""
+        """Whether a real-time priority is within these rights."""
         return self.sys_nice or self.rtprio >= priority
 
 

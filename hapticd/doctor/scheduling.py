@@ -87,7 +87,7 @@ def quota(root: Path = ROOT, daemon: int = 0) -> Finding:
         if without:
             return problem(
                 f"{who} is in the control group {group}, which has no real-time quota (CONFIG_RT_GROUP_SCHED): "
-                "SCHED_FIFO is refused there whatever the rights",
+                "SCHED_FIFO is refused there with any rights",
                 *_quota_lines(root, without),
                 "# it is gone with the group: for a service, see docs/doctor.md",
             )
@@ -114,7 +114,7 @@ def _without_v1(root: Path) -> Finding:
     if "cpu" not in controllers:
         return ok("CONFIG_RT_GROUP_SCHED, but no control group schedules processors")
     return problem(
-        "CONFIG_RT_GROUP_SCHED with cgroup v2: SCHED_FIFO is refused in every service whatever its rights, and "
+        "CONFIG_RT_GROUP_SCHED with cgroup v2: SCHED_FIFO is refused in every service with any rights, and "
         "v2 has no quota to give",
         "# start the kernel with rt_group_sched=0 (Linux 6.16 or later), or use one built without it",
     )

@@ -26,7 +26,7 @@ def main() -> None:
 
 
 def measured(loop: LoopConfig, seconds: float) -> dict[str, Any]:
-    """Sleep to every deadline for so long.
+    """Sleep to every deadline for `seconds`.
 
     Returns:
         `late_ns`, one a tick; `skipped` deadlines; `realtime`, whether scheduling and memory were as the loop wants.

@@ -18,7 +18,7 @@ def read(path: Path) -> str:
 
 
 def read_if_there(path: Path) -> str:
-    """The same; empty when it is not there or not for this user."""
+    """What a file says; empty when it is not there or not for this user."""
     try:
         return read(path)
     except OSError:

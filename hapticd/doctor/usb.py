@@ -27,7 +27,7 @@ def controller(places: Sequence[str], root: Path = ROOT) -> list[Finding]:
 
 
 def _on_usb(place: str, root: Path) -> Path | None:
-    """Directory in /sys of a device; None when it is not on USB, or nobody knows."""
+    """Directory in /sys of a device; None when it is not on USB, or that is unknown."""
     if place.startswith("/"):
         name = under(root, place).resolve().name
         links = [root / "sys/class" / kind / name / "device" for kind in ("hidraw", "tty")]

@@ -47,7 +47,7 @@ class FaultRecord:
 
     @property
     def fault_ns(self) -> int:
-        """When it happened, on CLOCK_MONOTONIC [ns]."""
+        """Time of the fault on CLOCK_MONOTONIC [ns]."""
         return int(self.header["event"]["deadline_ns"])
 
 

@@ -61,7 +61,7 @@ class CurveClient:
         keys: to show there, if it takes any.
 
     Attributes:
-        doubt: what is wrong with whoever answers there, empty when nothing is.
+        doubt: what is wrong with what answers there, empty when nothing is.
     """
 
     def __init__(self, socket: zmq.Socket[bytes], endpoint: str, keys: Key | None) -> None:
@@ -81,7 +81,7 @@ class CurveClient:
         self._poller.register(self._news, zmq.POLLIN)
 
     def connect(self) -> None:
-        """Connect, now and again whenever it is lost.
+        """Connect; ZeroMQ connects again after a loss.
 
         Raises:
             zmq.ZMQError: ZeroMQ cannot use the endpoint.

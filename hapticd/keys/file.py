@@ -42,7 +42,7 @@ class Key:
         public: the public key.
         secret: the secret key of the same pair, empty in a public file.
         server: the public key of the daemon that this client connects to, empty where there is none.
-        watch_only: whoever has it may subscribe and not command.
+        watch_only: its owner may subscribe and not command.
     """
 
     public: str
@@ -96,11 +96,11 @@ def read(path: Path) -> Key:
 
 
 def write(path: Path, key: Key, *, mode: int = 0o600, group: int = -1, replace: bool = False) -> None:
-    """Write a key file, whole or not at all, and never readable by more than it shall be.
+    """Write a key file, whole or not at all, and never readable by others than `mode` says.
 
     Args:
         path: where.
-        key: what it shall say.
+        key: what to write.
         mode: its permissions.
         group: its group, -1 for the user's own.
         replace: whether it may take the place of another.
@@ -114,7 +114,7 @@ def write(path: Path, key: Key, *, mode: int = 0o600, group: int = -1, replace: 
 
 @contextlib.contextmanager
 def written(path: Path, key: Key, *, mode: int = 0o600, group: int = -1, replace: bool = False) -> Iterator[None]:
-    """The same around what has to succeed first: the file takes its place at the end, or leaves nothing behind.
+    """Write a key file around a block: it takes its place when the block succeeds, else nothing is left of it.
 
     Raises:
         KeyWriteError: it is there already, or cannot be written.

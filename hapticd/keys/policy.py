@@ -27,7 +27,7 @@ def tcp_endpoints(config: Config) -> dict[str, str]:
 
 
 def takes_keys(name: str, endpoint: str) -> bool:
-    """Whether only listed keys come in.
+    """Whether a TCP endpoint admits listed keys only.
 
     Measurements leave this computer with keys only; commands over TCP take them on this computer too, since every
     program of every user reaches a port.

@@ -1,7 +1,7 @@
 """A TCP endpoint through which only listed keys come in.
 
 ZeroMQ asks about every client that has proved to own its key (ZAP, ZeroMQ RFC 27); `turn` answers. Without an answer
-nobody comes in.
+no client comes in.
 """
 
 from __future__ import annotations
@@ -17,14 +17,16 @@ from hapticd.keys.file import Key
 _HANDSHAKE_MS = 10_000  # that a client has to prove who it is
 _QUESTIONS = "inproc://zeromq.zap.01"
 _MOST_AT_ONCE = 50
-_MOST_STRANGERS = 100  # that are told of
+_MOST_STRANGERS = 100  # that are logged
 _TRIES_TOLD = 200
 
 log = logging.getLogger("hapticd")
 
 
 class CurveServer:
-    """The endpoint. Bind whatever else the socket shall have before it: what comes later would take keys as well.
+    """A TCP endpoint that admits listed keys only.
+
+    Bind the socket's other endpoints before it: those that come later take keys as well.
 
     Not for use from two threads, and one of it in a ZeroMQ context.
 
@@ -74,9 +76,9 @@ class CurveServer:
     def renew(self, pair: Key, admitted: frozenset[str]) -> None:
         """Take other keys over.
 
-        When somebody may no longer come in, everybody is disconnected and has to come in anew, which ZeroMQ does by
-        itself: it cannot disconnect one of them. That is done at the next turn, so that whoever asked for it over this
-        endpoint still gets the answer.
+        When a key is no longer listed, all clients are disconnected and those that are listed come back, which ZeroMQ
+        does by itself: it cannot disconnect one of them. That is done at the next turn, so that a client that asked
+        for it over this endpoint still gets the answer.
         """
         if self._admitted - admitted or pair != self._pair:
             self._closing = self._open
@@ -100,7 +102,7 @@ class CurveServer:
         self._open = True
 
     def _bind_again(self) -> None:
-        """ZeroMQ lets go of a port in a thread of its own, a moment after it was told to."""
+        """ZeroMQ lets go of a port in a thread of its own, a moment after it was asked to."""
         try:
             self._bind()
             self._tries = 0
@@ -108,7 +110,7 @@ class CurveServer:
             self._tries += 1
             if self._tries == _TRIES_TOLD:
                 why = zmq.strerror(error.errno or 0)
-                log.warning("%s: %s; nobody comes in there while that is so", self.endpoint, why)
+                log.warning("%s: %s; no client comes in there while that is so", self.endpoint, why)
 
     def _answer(self, who: bytes, empty: bytes, version: bytes, request: bytes, *said: bytes) -> None:
         _domain, address, _identity, mechanism, *credentials = said
@@ -120,7 +122,7 @@ class CurveServer:
             self._tell(address.decode(errors="replace"), key)
 
     def _tell(self, address: str, key: str) -> None:
-        """Who looks after the daemon may have forgotten to list it; once a stranger, since it may try for ever."""
+        """Log a refused key with the command that lists it; once for each stranger, since it may try for ever."""
         if (address, key) not in self._strangers and len(self._strangers) < _MOST_STRANGERS:
             self._strangers.add((address, key))
             advice = f"hapticd keys add NAME {shlex.quote(key)}"

@@ -26,7 +26,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 @dataclass(frozen=True, slots=True)
 class KeyRing:
-    """What a running daemon needs to know.
+    """The keys of a running daemon: its own pair and the listed clients.
 
     Attributes:
         pair: the daemon's own.
@@ -172,7 +172,7 @@ class KeyDirectory:
         return read(path)
 
     def _closed(self, path: Path) -> ConfigError:
-        """The service runs as a user of its own, to which root may have forgotten to give its keys."""
+        """The error for keys that root has not given to the service's own user."""
         whole = f"sudo chgrp -R {_GROUP} {self.path} && sudo chmod -R g+rX {self.path}"
         return ConfigError(f"{path}: this user may not read it; use sudo, or for the service: {whole}")
 
@@ -191,7 +191,7 @@ class KeyDirectory:
 
 
 def _service_group() -> int:
-    """Group of the system service; -1 where there is none, and for everybody but root."""
+    """Group of the system service; -1 where there is none, and for users other than root."""
     try:
         return grp.getgrnam(_GROUP).gr_gid if os.geteuid() == 0 else -1
     except KeyError:

@@ -201,7 +201,7 @@ class Installation:
         return [_LINK] if link.is_symlink() and link.readlink() == self.executable else []
 
     def _remove(self, path: Path) -> bool:
-        """Remove a file, and the directories above it that are empty now and nobody else's."""
+        """Remove a file, and the directories above it that are empty now and hold nothing of others."""
         target = self._at(path)
         try:
             target.unlink()

@@ -1,7 +1,7 @@
 """Publishes what happened, tick by tick, over ZeroMQ; never waits for a subscriber.
 
-One XPUB socket, its sends non-blocking: who falls behind by `send_high_water` messages loses the next and
-sees it by `seq`; nobody else notices.
+One XPUB socket, its sends non-blocking: a subscriber that falls behind by `send_high_water` messages loses
+the next and sees it by `seq`; the others lose none.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ _LARGEST_REQUEST = 1024  # bytes of a subscription; a subscriber has nothing lon
 
 @dataclass(slots=True)
 class PublisherCounts:
-    """What a publisher did so far.
+    """Counts of a publisher since it was made.
 
     Attributes:
         ticks: ticks published, after decimation.
         cycles: cycles published.
         events: events published.
-        messages: messages sent, whoever received them.
+        messages: messages sent, received or not.
         payload_bytes: bytes of payload in them.
         refused: messages that ZeroMQ did not take, 0 unless something is wrong.
         invalid: maps in which a number was not finite.
@@ -131,7 +131,7 @@ class Publisher:
         self._input_every_tick = config.input_every_tick
 
     def admit(self, ring: KeyRing) -> None:
-        """Take other keys over; whoever is no longer listed is disconnected."""
+        """Take other keys over; a client that is no longer listed is disconnected."""
         if self._gate is not None:
             self._gate.renew(ring.pair, ring.watchers())
 
@@ -158,7 +158,7 @@ class Publisher:
         self._send(Topic.EVENT, [wire.event_map(event, timestamp_s(event.deadline_ns, self._offset_ns))])
 
     def status(self, status: Mapping[str, Any]) -> None:
-        """Publish the state of the daemon, and keep it for whoever subscribes later."""
+        """Publish the state of the daemon, and keep it for later subscribers."""
         self._status = dict(status)
         self._send_status()
 

@@ -139,7 +139,7 @@ class Cycle:
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """Buttons, gripper and wrist; what the device has not is None or empty.
+    """Buttons, gripper and wrist; what the device does not have is None or empty.
 
     Attributes:
         timestamp: seconds since the epoch at the tick's deadline [s].
@@ -162,7 +162,7 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something happened.
+    """One event: a code, a text, and fields of its own.
 
     Attributes:
         timestamp: seconds since the epoch at its tick [s].
@@ -183,7 +183,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Ticks that did not arrive, told before the first record after them.
+    """Ticks that did not arrive; it comes before the first record after them.
 
     Attributes:
         topic: of those ticks.
@@ -235,7 +235,7 @@ class Status:
         timestamp: when it was said [s since the epoch]; the publisher fills it in.
         seq: last tick published, -1 before the first; the publisher fills it in.
         schema: version of the wire contract; the publisher fills it in.
-        every_ticks: one tick in so many is published; the publisher fills it in.
+        every_ticks: one tick in this many is published; the publisher fills it in.
         version: of hapticd.
         instance: name of the daemon's instance.
         rate_hz: ticks a second that the loop is set to [Hz].

@@ -191,7 +191,7 @@ def cycle_map(record: TickRecord, timestamp: float, wall: int) -> Map:
 
 
 def event_map(event: LoopEvent, timestamp: float) -> Map:
-    """hapticd/event: what happened; its fields stand beside the four keys that every event has."""
+    """hapticd/event: what happened; its fields come with the four keys that every event has."""
     return plain_map({**event.fields, "timestamp": timestamp, "seq": event.seq, "code": event.code, "text": event.text})
 
 

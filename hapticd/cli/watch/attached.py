@@ -30,7 +30,7 @@ def run_watched(config: Path, instance: str) -> int:
         The daemon's exit code.
     """
     hapticd = [sys.executable, "-m", "hapticd"]
-    # Whatever ends us, be it the terminal that is closed, the daemon ramps its force out and the view ends as well.
+    # When we end in any way, as when the terminal is closed, the daemon ramps its force out and the view ends.
     with_us = partial(die_with_parent, os.getpid())
     with tempfile.TemporaryFile("w+") as log:
         # In a session of its own: the terminal's interrupt closes the view, which then ends the daemon in good order.
@@ -62,7 +62,7 @@ def run_watched(config: Path, instance: str) -> int:
 
 
 def _ended(process: subprocess.Popen[bytes], timeout_s: float) -> int:
-    """Exit code of a process that was told to end; one that does not is killed."""
+    """Exit code of a process that was asked to end; one that does not is killed."""
     try:
         return process.wait(timeout_s)
     except subprocess.TimeoutExpired:

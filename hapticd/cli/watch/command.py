@@ -91,7 +91,7 @@ def show(
     Raises:
         SilenceError: `once` or `picture`, and no daemon answered.
         UnwritableError: the picture cannot be written.
-        RefusedKeyError: the daemon lets only those in whose keys it lists.
+        RefusedKeyError: the daemon does not list this key.
         SchemaError, WireError: what answers speaks otherwise.
         KeyboardInterrupt: Ctrl-C.
     """
@@ -144,7 +144,7 @@ class _Feed:
         return time.monotonic() - self.known.heard_s > SILENT_S
 
     def drain(self, timeout_s: float = 0.0) -> list[Record]:
-        """Take all that has come; wait for the first so long."""
+        """Take all that has come; wait for the first until `timeout_s` is over."""
         taken: list[Record] = []
         records = self._client.receive(timeout_s)
         while records:
@@ -187,7 +187,7 @@ def _live(feed: _Feed, console: Console, stop: Callable[[], bool]) -> None:
                 lines = frame(feed.known, feed.endpoint, width, height, time.monotonic())
                 live.update(Group(*lines), refresh=True)
         finally:
-            live.update("", refresh=True)  # a terminal that was resized meanwhile would bring some of it back
+            live.update("", refresh=True)  # a terminal that was resized during the view would bring some of it back
 
 
 @contextmanager

@@ -101,7 +101,7 @@ def plot(
 
 
 def axis(lowest: float, highest: float, least: float) -> tuple[float, float]:
-    """Round ends of an axis that holds both values and is at least so long; they change seldom while values do."""
+    """Round ends of an axis that holds both values and spans at least `least`; they change seldom while values do."""
     least = max(least, 1e-6 * max(abs(lowest), abs(highest)))  # what a float still resolves
     span = max(highest - lowest, least)
     step = 10.0 ** math.floor(math.log10(span))

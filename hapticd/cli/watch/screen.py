@@ -1,4 +1,4 @@
-"""The picture that `hapticd watch` shows: what is known of a daemon, and how it looks on so many lines."""
+"""The picture that `hapticd watch` shows: what is known of a daemon, and how it looks on a terminal."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from hapticd.client import Cycle, Damping, Energy, Event, Gap, Position, Record,
 from hapticd.telemetry.records import LATE_EDGES_US
 
 SILENT_S = 2.5
-"""A daemon that has said nothing for so long is gone: it says its status every second."""
+"""After this silence [s] a daemon counts as gone: it says its status every second."""
 
 LATE_US = 160
-"""Ticks that started at least so late are counted as late; an edge of the histogram."""
+"""Ticks that started this late or later [us] are counted as late; an edge of the histogram."""
 
 _AXIS_STYLES = ("cyan", "magenta", "green")
 _REQUESTED = "red"
@@ -56,7 +56,7 @@ class ScreenState:
         self._damping_due_s = 0.0
 
     def take(self, records: Sequence[Record], now_s: float) -> None:
-        """Learn from what came.
+        """Take records over.
 
         Args:
             records: in the order in which they came.
@@ -102,7 +102,7 @@ class ScreenState:
 
 
 def frame(known: ScreenState, endpoint: str, width: int, height: int, now_s: float) -> list[Text]:
-    """The picture: exactly so many lines of exactly so many characters.
+    """The picture: exactly `height` lines of exactly `width` characters.
 
     Args:
         known: what to show.
