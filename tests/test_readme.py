@@ -1,4 +1,4 @@
-"""What the README shows works as it stands there."""
+"""What README and CONTRIBUTING show is there, and works as it stands there."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from hapticd.cli.app import COMMANDS
 from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, Daemon
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
 
 
 def shown() -> list[list[str]]:
@@ -33,14 +36,28 @@ def test_it_is_read_in_five_minutes() -> None:
     assert len(snippets()) == 3
 
 
-def test_every_command_and_file_that_it_names_is_there() -> None:
+def test_every_command_and_configuration_that_it_names_is_there() -> None:
     assert len(shown()) >= 6
     for command in shown():
         assert command[0] in {*COMMANDS, "study", "bench"}
         for word in command:
             assert not word.startswith("config/") or (ROOT / word).is_file()
-    for target in re.findall(r"\]\(([^):]*)\)", README):
-        assert (ROOT / target).exists(), target
+
+
+@pytest.mark.parametrize("page", [README, CONTRIBUTING], ids=["README", "CONTRIBUTING"])
+def test_every_page_that_it_links_is_there(page: str) -> None:
+    targets = re.findall(r"\]\(([^):#]*)[^):]*\)", page)
+    assert targets
+    assert not [target for target in targets if not (ROOT / target).exists()]
+
+
+def test_a_newcomer_reads_of_every_room() -> None:
+    assert len(CONTRIBUTING.splitlines()) <= 120
+    for room in (ROOT / "hapticd").iterdir():
+        if room.is_dir() and (room / "__init__.py").exists():
+            assert f"`{room.name}/`" in CONTRIBUTING, room
+        elif room.suffix == ".py" and not room.stem.startswith("_"):
+            assert f"`{room.name}`" in CONTRIBUTING, room
 
 
 def test_the_simulation_that_it_shows_runs(tmp_path: Path) -> None:

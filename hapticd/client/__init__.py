@@ -16,7 +16,7 @@ from hapticd.client.commands import RefusedConfigError, RefusedError
 from hapticd.client.connection import Client
 from hapticd.client.daemon import DaemonClient, connect
 from hapticd.client.decode import decode
-from hapticd.errors import ClientError, SchemaError, SilenceError, WireError
+from hapticd.errors import ClientError, InstanceError, SchemaError, SilenceError, WireError
 from hapticd.keys.client import RefusedKeyError
 from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Status, Timing
 from hapticd.tick.event import EventCode
@@ -32,6 +32,7 @@ __all__ = [
     "EventCode",
     "Gap",
     "Input",
+    "InstanceError",
     "Position",
     "Record",
     "RefusedConfigError",
