@@ -58,11 +58,13 @@ def test_the_page_shows_the_examples_as_they_are(language: str, name: str) -> No
 
 
 def test_the_typed_examples_compile() -> None:
-    snippets = re.findall(r"```python\n(from hapticd\.client.+?)```", PAGE, flags=re.DOTALL)
-    assert snippets
+    snippets = re.findall(r"```python\n(import hapticd\n.+?)```", PAGE, flags=re.DOTALL)
+    assert len(snippets) == 2
     for snippet in snippets:
         compile(snippet, "telemetry.md", "exec")
-        for name in re.findall(r"import (.+)", snippet)[0].split(", "):
+        assert "hapticd.connect(" in snippet
+    for names in re.findall(r"from hapticd\.client import (.+)", "".join(snippets)):
+        for name in names.split(", "):
             assert hasattr(client, name)
 
 
