@@ -27,7 +27,8 @@ from hypothesis import strategies as st
 
 from hapticd.cli import main
 from hapticd.cli.watch.plot import SLICE_S, Trace, axis, bars, plot
-from hapticd.cli.watch.screen import ScreenState, frame, late_ticks, one_line, si
+from hapticd.cli.watch.screen import frame, late_ticks, one_line, si
+from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Cycle, Damping, Energy, Event, Position, Status
 from hapticd.telemetry.records import LateHistogram
 from hapticd.tick import event as contract

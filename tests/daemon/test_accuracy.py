@@ -8,7 +8,8 @@ import signal
 
 import pytest
 
-from hapticd.cli.watch.screen import ScreenState, frame
+from hapticd.cli.watch.screen import frame
+from hapticd.cli.watch.state import ScreenState
 from hapticd.config.loading import load, parse
 from hapticd.loop.memory import RECORDS
 from hapticd.offline.model_choice import track

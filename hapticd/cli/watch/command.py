@@ -24,7 +24,8 @@ from rich.console import Console, Group
 from rich.live import Live
 
 from hapticd.cli.remote import Instance, Keys
-from hapticd.cli.watch.screen import SILENT_S, ScreenState, frame, one_line
+from hapticd.cli.watch.screen import SILENT_S, frame, one_line
+from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Client, Event, Record, SilenceError, Status
 from hapticd.errors import HapticdError
 from hapticd.paths import DEFAULT_INSTANCE, telemetry_endpoint

@@ -1,17 +1,17 @@
-"""The picture that `hapticd watch` shows: what is known of a daemon, and how it looks on a terminal."""
+"""The picture that `hapticd watch` shows: how what is known of a daemon looks on a terminal."""
 
 from __future__ import annotations
 
 import math
 import textwrap
 import time
-from collections import deque
 from collections.abc import Sequence
 
 from rich.text import Text
 
-from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, Trace, bars, plot
-from hapticd.client import Cycle, Damping, Energy, Event, Gap, Position, Record, Status
+from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, bars, plot
+from hapticd.cli.watch.state import ScreenState
+from hapticd.client import Position, Status
 from hapticd.telemetry.records import LATE_EDGES_US
 
 SILENT_S = 2.5
@@ -23,82 +23,10 @@ LATE_US = 160
 _AXIS_STYLES = ("cyan", "magenta", "green")
 _REQUESTED = "red"
 _QUIET = "bright_black"
-_HISTORY_S = 1.0  # between two bars of a wall's damping
 _NARROW = 64
 _CYCLES_WIDTH = 36
 _PREFIXES = ((1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _MOST_WALLS = 4
-
-
-class ScreenState:
-    """What is known of a daemon from the records that have come.
-
-    Attributes:
-        status: its latest status, None before the first.
-        position, energy, damping: its latest tick.
-        cycles, events: the latest ones, newest first.
-        heard_s: when anything came last, on the caller's clock [s].
-        lost: ticks that this viewer did not get.
-    """
-
-    def __init__(self) -> None:
-        self.status: Status | None = None
-        self.position: Position | None = None
-        self.energy: Energy | None = None
-        self.damping: Damping | None = None
-        self.cycles: deque[Cycle] = deque(maxlen=100)
-        self.events: deque[Event] = deque(maxlen=100)
-        self.heard_s = -math.inf
-        self.lost = 0
-        self.positions = Trace(0)
-        self.forces = Trace(0)
-        self.dampings: list[deque[float]] = []
-        self._damping_due_s = 0.0
-
-    def take(self, records: Sequence[Record], now_s: float) -> None:
-        """Take records over.
-
-        Args:
-            records: in the order in which they came.
-            now_s: the caller's clock [s].
-        """
-        if records:
-            self.heard_s = now_s
-        for record in records:
-            match record:
-                case Position():
-                    self._take_position(record)
-                case Energy():
-                    self.energy = record
-                case Damping():
-                    self._take_damping(record)
-                case Cycle():
-                    self.cycles.appendleft(record)
-                case Event():
-                    self.events.appendleft(record)
-                case Status():
-                    self.status = record
-                case Gap() if record.topic == Position.topic:
-                    self.lost += record.missing
-                case _:
-                    pass
-
-    def _take_position(self, position: Position) -> None:
-        if self.positions.series != len(position.position_m):
-            self.positions = Trace(len(position.position_m))
-            self.forces = Trace(2 * len(position.position_m))
-        self.positions.add(position.timestamp, position.position_m)
-        self.forces.add(position.timestamp, position.force_requested_n + position.force_n)
-        self.position = position
-
-    def _take_damping(self, damping: Damping) -> None:
-        self.damping = damping
-        if len(self.dampings) != len(damping.damping_n_s_per_m):
-            self.dampings = [deque(maxlen=8) for _ in damping.damping_n_s_per_m]
-        if abs(damping.timestamp - self._damping_due_s) >= _HISTORY_S:
-            self._damping_due_s = damping.timestamp
-            for history, value in zip(self.dampings, damping.damping_n_s_per_m, strict=True):
-                history.append(value)
 
 
 def frame(known: ScreenState, endpoint: str, width: int, height: int, now_s: float) -> list[Text]:
@@ -286,7 +214,7 @@ def _plots(known: ScreenState, status: Status, width: int, height: int) -> list[
             return _position_box(known, status, width, height)
         return _position_box(known, status, width, upper) + _force_box(known, status, width, height - upper)
     left = width // 2
-    return _beside(_position_box(known, status, left, height), _force_box(known, status, width - left, height))
+    return _side_by_side(_position_box(known, status, left, height), _force_box(known, status, width - left, height))
 
 
 def _position_box(known: ScreenState, status: Status, width: int, height: int) -> list[Text]:
@@ -377,7 +305,7 @@ def _logs(known: ScreenState, width: int, rows: int) -> list[Text]:
         return _box("events", Text(""), _event_rows(known, rows), width)
     left = _CYCLES_WIDTH
     cycles = _box("cycles", Text(""), _cycle_rows(known, rows), left)
-    return _beside(cycles, _box("events", Text(""), _event_rows(known, rows), width - left))
+    return _side_by_side(cycles, _box("events", Text(""), _event_rows(known, rows), width - left))
 
 
 def _cycle_rows(known: ScreenState, rows: int) -> list[Text]:
@@ -437,5 +365,5 @@ def _quiet(text: str) -> Text:
     return Text("").append(text, _QUIET)
 
 
-def _beside(left: Sequence[Text], right: Sequence[Text]) -> list[Text]:
+def _side_by_side(left: Sequence[Text], right: Sequence[Text]) -> list[Text]:
     return [Text("").append_text(one).append_text(other) for one, other in zip(left, right, strict=True)]
