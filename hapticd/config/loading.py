@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +15,7 @@ from hapticd import plugins
 from hapticd.config.file import read
 from hapticd.config.models import Config, ControllerConfig, DeviceConfig
 from hapticd.config.problems import Problems, nearest
+from hapticd.config.values import with_values
 from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import ConfigError, PluginError
 from hapticd.law import LawParams
@@ -29,7 +30,7 @@ _MAKE_IMPORTABLE = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class LoadedConfig:
     """A configuration that can be used.
 
@@ -61,14 +62,36 @@ class LoadedConfig:
         """The first 12 digits of `sha256`: what status messages carry."""
         return self.sha256[:12]
 
+    def with_values(self, values: Mapping[str, Any]) -> LoadedConfig:
+        """This configuration with other values, checked as a file is; the name stays, comments of the text are lost.
 
-def load(path: Path | str) -> LoadedConfig:
-    """Read and check a configuration file.
+        Args:
+            values: by key, such as `{"scene.walls[0].stiffness_n_per_m": 15e3, "controller.law": "tdpa"}`. With another
+                law the parameters of the one before leave, with another driver its options.
+
+        Raises:
+            ConfigError: a key that has no place, or a value that cannot be used; names the key.
+        """
+        name = str(self.path)
+        return parse(with_values(self.text, name, values), name)
+
+    def __repr__(self) -> str:
+        device, law = self.config.device.driver, self.config.controller.law
+        return f"<configuration {self.path}: {device} with {law} at {self.config.loop.rate_hz:g} Hz>"
+
+
+def load(source: Path | str) -> LoadedConfig:
+    """Read and check a configuration.
+
+    Args:
+        source: its file, or its text: a string of several lines.
 
     Raises:
         ConfigError: it cannot be read or used; carries every problem, one line each.
     """
-    return parse(read(path), str(path))
+    if isinstance(source, str) and "\n" in source:
+        return parse(source, "configuration")
+    return parse(read(source), str(source))
 
 
 def parse(text: str, name: str) -> LoadedConfig:
