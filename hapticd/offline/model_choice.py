@@ -7,8 +7,6 @@ the same model.
 
 from __future__ import annotations
 
-import math
-from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,7 +15,7 @@ from typing import Any, Literal, cast
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.offline.operations import count_operations
-from hapticd.offline.rehearsal import Rehearsal
+from hapticd.offline.run import rehearse
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import Accuracy, Change, SimulationOptions
 from hapticd.simulation.plant import METHODS, terms
@@ -26,29 +24,6 @@ COUNTED_TICKS = 25
 """How many ticks, spread over the run, the cost of a candidate is counted in."""
 
 Integrator = Literal["exact", "explicit-euler", "semi-implicit-euler", "velocity-verlet", "rk4"]
-
-
-@dataclass(frozen=True, slots=True)
-class Track:
-    """What a rehearsal did, an element a tick.
-
-    Attributes:
-        x_m: true position of the device [m].
-        energy_j: energy into all walls [J].
-        force_n: what was written to the device, along the first wall's normal [N].
-    """
-
-    x_m: array[float]
-    energy_j: array[float]
-    force_n: array[float]
-
-    def position_error_m(self, exact: Track) -> float:
-        """Largest distance from another track [m]; infinite when this one ends early."""
-        return _largest(self.x_m, exact.x_m)
-
-    def energy_error_j(self, exact: Track) -> float:
-        """Largest difference of the energy [J]; infinite when this one ends early."""
-        return _largest(self.energy_j, exact.energy_j)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,20 +82,6 @@ def fitted(loaded: LoadedConfig) -> LoadedConfig:
     return loaded if found is None else replace(loaded, options=found.options)
 
 
-def track(loaded: LoadedConfig, options: SimulationOptions, ticks: int) -> Track:
-    """Rehearse a configuration with a device model."""
-    rehearsal = Rehearsal(loaded, options)
-    found = Track(array("d"), array("d"), array("d"))
-    model, tick = rehearsal.model, rehearsal.tick
-    first = tick.contacts[0].wall if tick.contacts else None
-    axis, outward = (first.axis, first.outward) if first else (0, 1.0)
-    for _ in rehearsal.run(ticks):
-        found.x_m.append(model.x_m)
-        found.energy_j.append(sum([contact.ledger.energy_j for contact in tick.contacts]))
-        found.force_n.append(outward * tick.force_n[axis])
-    return found
-
-
 def operations(options: SimulationOptions, period_s: float, force_n: Sequence[float]) -> float:
     """Instructions that one period of a device takes, as a mean over some periods under these commands."""
     device = SimulatedDevice(options, period_s)
@@ -144,9 +105,9 @@ class _Fitting:
         self._options = options
         self._accuracy = accuracy
         self._period_s = loaded.config.loop.period_s
-        self._ticks = max(1, round(accuracy.over_s / self._period_s))
-        self._exact = track(loaded, options, self._ticks)
-        self._full_operations = operations(options, self._period_s, self._exact.force_n)
+        self._exact = rehearse(loaded, accuracy.over_s, options)
+        self._force_n = self._exact.columns["force_n"]
+        self._full_operations = operations(options, self._period_s, self._force_n)
         self._tried: dict[tuple[str, tuple[str, ...]], tuple[float, float]] = {("exact", ()): (0.0, 0.0)}
 
     def best(self) -> Fit:
@@ -174,7 +135,7 @@ class _Fitting:
         return sorted(found, key=lambda one: (one[0], METHODS.index(one[1]), len(one[2])))
 
     def _cost(self, method: Integrator, left_out: Sequence[Omission]) -> float:
-        return operations(self._model(method, left_out), self._period_s, self._exact.force_n)
+        return operations(self._model(method, left_out), self._period_s, self._force_n)
 
     def _takes_instructions(self, term: Omission) -> bool:
         """Whether the step is another one without it; mass and damping only change its coefficients."""
@@ -186,7 +147,7 @@ class _Fitting:
     def _errors(self, method: Integrator, left_out: Sequence[Omission]) -> tuple[float, float]:
         key = (method, tuple(one.key for one in left_out))
         if key not in self._tried:
-            found = track(self._loaded, self._model(method, left_out), self._ticks)
+            found = rehearse(self._loaded, self._accuracy.over_s, self._model(method, left_out))
             self._tried[key] = found.position_error_m(self._exact), found.energy_error_j(self._exact)
         return self._tried[key]
 
@@ -204,18 +165,12 @@ class _Fitting:
             omitted=tuple(one.key for one in left_out),
             position_error_m=position_m,
             energy_error_j=energy_j,
-            over_s=self._ticks * self._period_s,
+            over_s=self._exact.ticks * self._period_s,
             operations=cost,
             full_operations=self._full_operations,
             rehearsed=len(self._tried),
             hash=self._loaded.hash,
         )
-
-
-def _largest(values: Sequence[float], exact: Sequence[float]) -> float:
-    if len(values) < len(exact):
-        return math.inf
-    return max((abs(value - true) for value, true in zip(values, exact, strict=False)), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)

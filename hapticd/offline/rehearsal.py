@@ -12,10 +12,13 @@ from dataclasses import replace
 from hapticd.config.loading import LoadedConfig
 from hapticd.errors import ConfigError, DriverError
 from hapticd.simulation.device import SimulatedDevice
-from hapticd.simulation.driver import SimulatedDriver
+from hapticd.simulation.driver import FARTHEST_M, SimulatedDriver
 from hapticd.simulation.options import SimulationOptions
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.guard import Mode
+
+MakeDevice = Callable[[SimulationOptions, float], SimulatedDevice]
+"""Makes the model of a device, given its options and the period [s]."""
 
 
 class Rehearsal:
@@ -30,6 +33,7 @@ class Rehearsal:
         model: the simulated device.
         tick: the daemon's tick on it.
         fault: why the daemon would have stopped, once it is known; None as long as it would not.
+        diverged: whether the model left all bounds.
 
     Raises:
         ConfigError: the configuration is not one for a simulated device.
@@ -39,12 +43,13 @@ class Rehearsal:
         self,
         loaded: LoadedConfig,
         options: SimulationOptions | None = None,
-        make_device: Callable[[SimulationOptions, float], SimulatedDevice] | None = None,
+        make_device: MakeDevice | None = None,
     ) -> None:
         wanted = simulation_options(loaded) if options is None else options
         loaded = replace(loaded, options=wanted)
         self.period_s = loaded.config.loop.period_s
         self.fault: str | None = None
+        self.diverged = False
         driver = loaded.driver(wanted, self.period_s)
         assert isinstance(driver, SimulatedDriver)
         if make_device is not None:
@@ -80,6 +85,7 @@ class Rehearsal:
                 yield count
         except DriverError as error:
             self.fault = self.fault or str(error)
+            self.diverged = not abs(self.model.measured_m) < FARTHEST_M
         finally:
             driver.close()
 

@@ -1,34 +1,36 @@
-"""A rehearsed configuration as rows, and a summary of them."""
+"""One run of a configuration offline: every tick, and what became of it."""
 
 from __future__ import annotations
 
+import html
 import math
 from array import array
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
-
-import numpy as np
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.errors import ConfigError, DriverError
-from hapticd.offline.model_choice import fitted
-from hapticd.offline.rehearsal import Rehearsal
-from hapticd.offline.verdict import Balance, Criterion, Outcome, balance
-from hapticd.simulation.device import SimulatedDevice
+from hapticd.config.models import Config
+from hapticd.errors import ConfigError, DriverError, HapticdError
+from hapticd.offline.column import Column
+from hapticd.offline.outcome import Balance, Criterion, Outcome, balance
+from hapticd.offline.plot import draw, inline_image
+from hapticd.offline.rehearsal import MakeDevice, Rehearsal
 from hapticd.simulation.options import SimulationOptions
-from hapticd.tick.contact import Contact
-from hapticd.tick.tick import ControlTick
 
-WINDOW_S = 0.5
-"""The end of a run that its summary looks at [s]."""
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-PROGRESS_TICKS = 2000
-"""How often progress is told."""
+LONGEST_S = 1e9
+"""The longest run [s]."""
 
-_LONGEST_S = 1e9
+_CHUNK_TICKS = 2000
+"""Ticks that are collected at once; progress is told as often."""
+
+_CODES = {"cycle": "q", "in_contact": "b"}
+"""Type codes of the columns that hold no floats."""
 
 
 class Row(NamedTuple):
@@ -58,309 +60,336 @@ class Row(NamedTuple):
     in_contact: int
 
 
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """What became of a run; means and spans are of its last `window_s` seconds.
+@dataclass(frozen=True, repr=False, eq=False)
+class Run:
+    """One run: a column a quantity, an element a tick, and what became of it.
+
+    Spans, means and stiffness are of the last half second, which is what the outcome is judged by.
 
     Attributes:
-        ticks: ticks that were run.
-        window_s: the end of the run that is looked at [s].
-        peak_to_peak_m, measured_peak_to_peak_m: span of the true and of the measured position [m].
-        mean_depth_m: mean depth in the first wall, true position, negative outside [m].
-        displayed_stiffness_n_per_m: mean force over mean true depth while in contact; None without contact.
-        measured_stiffness_n_per_m: the same over the measured depth, which is what the law sees.
-        commanded_stiffness_n_per_m: stiffness of the first wall at the end; None without a wall.
-        cycles: completed energy cycles of the first wall.
-        damping_n_s_per_m: damping of the law at the end.
+        name: of the configuration, usually its path.
+        config: what was run.
+        options: the device that was run.
+        columns: every column by its name, as `array.array`; a run whose rows were taken keeps the last half second.
+        ticks: how many were run.
+        left_place_tick: the last tick in which the device was not in the place where it should rest; -1: none.
         peak_force_n: largest force that was applied, magnitude, whole run [N].
-        energy_j, generated_j, dissipated_j: the books of all walls at the end [J].
+        stiffness_n_per_m: of the first wall at the end, as commanded; NaN without a wall.
+        generated_j, dissipated_j: the books of all walls at the end [J].
         fault: why the daemon would have stopped; None when it would not.
+        diverged: whether the model left all bounds, whatever stopped the daemon before.
     """
 
+    name: str
+    config: Config
+    options: SimulationOptions
+    columns: Mapping[str, array[Any]]
     ticks: int
-    window_s: float
-    peak_to_peak_m: float
-    measured_peak_to_peak_m: float
-    mean_depth_m: float
-    displayed_stiffness_n_per_m: float | None
-    measured_stiffness_n_per_m: float | None
-    commanded_stiffness_n_per_m: float | None
-    cycles: int
-    damping_n_s_per_m: float
+    left_place_tick: int
     peak_force_n: float
-    energy_j: float
+    stiffness_n_per_m: float
     generated_j: float
     dissipated_j: float
     fault: str | None
+    diverged: bool
 
-
-class OfflineRun:
-    """One run of a configuration.
-
-    Args:
-        loaded: the configuration.
-        duration_s: simulated time [s].
-
-    Attributes:
-        ticks: how many ticks that takes.
-
-    Raises:
-        ConfigError: the duration makes no sense, or the configuration is not one for a simulated device.
-    """
-
-    def __init__(self, loaded: LoadedConfig, duration_s: float) -> None:
-        self._period_ns = loaded.config.loop.period_ns
-        self.period_s = loaded.config.loop.period_s
-        if not self.period_s <= duration_s <= _LONGEST_S:
-            raise ConfigError(
-                f"duration = {duration_s:g} s: must be at least one period, {self.period_s:g} s, "
-                f"and at most {_LONGEST_S:g} s"
-            )
-        self.ticks = round(duration_s / self.period_s)
-        self._rehearsal = Rehearsal(fitted(loaded))
-        self._tick = self._rehearsal.tick
+    t_s = Column("time since the first tick [s]")
+    x_m = Column("true position, relative to the first wall and < 0 inside it [m]")
+    v_m_per_s = Column("true velocity [m/s]")
+    x_measured_m = Column("position as the device reports it [m]")
+    force_n = Column("force applied from this tick to the next, > 0 pushes out [N]")
+    force_requested_n = Column("what wall and law asked for [N]")
+    energy_j = Column("energy that has flowed into all walls [J]")
+    cycle = Column("completed energy cycles of the first wall")
+    damping_n_s_per_m = Column("damping of the law on the first wall; 0 when it has none [N s/m]")
+    in_contact = Column("whether the device is inside the first wall")
 
     @property
-    def fault(self) -> str | None:
-        """Why the daemon would have stopped, once it is known; None as long as it would not."""
-        return self._rehearsal.fault
-
-    def run(self, take: Callable[[Row], object], progress: Callable[[int], None] | None = None) -> Summary:
-        """Run from the first tick to the last, or to where the model has diverged.
-
-        Args:
-            take: is given every row.
-            progress: is told now and then how many ticks are done.
-
-        Raises:
-            DriverError: there was not even a first tick.
-        """
-        window = _Window(max(1, round(WINDOW_S / self.period_s)))
-        for row in self._rows():
-            take(row)
-            window.enter(row)
-            if progress is not None and window.ticks % PROGRESS_TICKS == 0:
-                progress(window.ticks)
-        if not window.ticks:
-            raise DriverError(self.fault or "the device gave no sample")
-        return window.summary(self._tick, self.period_s, self.fault)
-
-    def _rows(self) -> Iterator[Row]:
-        tick, model, period_ns = self._tick, self._rehearsal.model, self._period_ns
-        first: Contact | None = tick.contacts[0] if tick.contacts else None
-        axis = first.wall.axis if first else 0
-        outward = first.wall.outward if first else 1.0
-        ledgers = [contact.ledger for contact in tick.contacts]
-        for count in self._rehearsal.run(self.ticks):
-            yield Row(
-                count * period_ns / 1e9,
-                model.x_m,
-                model.v_m_per_s,
-                first.x_m if first else tick.motion.position_m[0],
-                outward * tick.force_n[axis],
-                outward * tick.requested_n[axis],
-                sum([ledger.energy_j for ledger in ledgers]),
-                first.ledger.cycle if first else 0,
-                first.damping_n_s_per_m if first else 0.0,
-                int(first.in_contact) if first else 0,
-            )
-
-
-class _Window:
-    """The last rows, whenever the run ends."""
-
-    def __init__(self, length: int) -> None:
-        self.ticks = 0
-        self._rows: deque[Row] = deque(maxlen=length)
-        self._peak_n = 0.0
-
-    def enter(self, row: Row) -> None:
-        self.ticks += 1
-        self._rows.append(row)
-        if not -self._peak_n <= row.force_n <= self._peak_n:
-            self._peak_n = abs(row.force_n)
-
-    def summary(self, tick: ControlTick, period_s: float, fault: str | None) -> Summary:
-        true_m = [row.x_m for row in self._rows]
-        measured_m = [row.x_measured_m for row in self._rows]
-        inside = [row for row in self._rows if row.in_contact]
-        ledgers = [contact.ledger for contact in tick.contacts]
-        last = self._rows[-1]
-        return Summary(
-            ticks=self.ticks,
-            window_s=len(self._rows) * period_s,
-            peak_to_peak_m=max(true_m) - min(true_m),
-            measured_peak_to_peak_m=max(measured_m) - min(measured_m),
-            mean_depth_m=-sum(true_m) / len(true_m),
-            displayed_stiffness_n_per_m=_stiffness(inside, [row.x_m for row in inside]),
-            measured_stiffness_n_per_m=_stiffness(inside, [row.x_measured_m for row in inside]),
-            commanded_stiffness_n_per_m=tick.contacts[0].wall.stiffness_n_per_m if tick.contacts else None,
-            cycles=last.cycle,
-            damping_n_s_per_m=last.damping_n_s_per_m,
-            peak_force_n=self._peak_n,
-            energy_j=sum(ledger.energy_j for ledger in ledgers),
-            generated_j=sum(ledger.generated_j for ledger in ledgers),
-            dissipated_j=sum(ledger.dissipated_j for ledger in ledgers),
-            fault=fault,
-        )
-
-
-def _stiffness(rows: list[Row], x_m: list[float]) -> float | None:
-    """Mean force over mean depth; None where there is no depth."""
-    depth_m = -sum(x_m)
-    return sum(row.force_n for row in rows) / depth_m if depth_m > 0.0 else None
-
-
-MakeDevice = Callable[[SimulationOptions, float], SimulatedDevice]
-
-SETTLING_BAND = 0.05
-"""A device has settled once it stays within this share of the distance from start to rest."""
-
-
-@dataclass(frozen=True)
-class Played:
-    """One run, an element a tick.
-
-    Attributes:
-        options: the device that was run.
-        period_s: time between ticks [s].
-        balance: where hand and springs balance.
-        x_m: true position [m].
-        v_m_per_s: true velocity [m/s].
-        measured_m: position that the loop saw [m].
-        force_n: what the loop wrote, along the first wall's normal [N].
-        energy_j: energy into all walls [J].
-        inside: 1 in contact with the first wall, else 0.
-        fault: why the daemon would have stopped; None when it would not.
-    """
-
-    options: SimulationOptions
-    period_s: float
-    balance: Balance
-    x_m: array[float]
-    v_m_per_s: array[float]
-    measured_m: array[float]
-    force_n: array[float]
-    energy_j: array[float]
-    inside: array[int]
-    fault: str | None
+    def period_s(self) -> float:
+        """Time between ticks [s]."""
+        return self.config.loop.period_s
 
     @property
     def window(self) -> slice:
-        """The last half second."""
-        return slice(-max(1, round(Criterion().window_s / self.period_s)), None)
+        """The last half second, or all of a shorter run."""
+        return slice(-min(self.ticks, _window_ticks(self.period_s)), None)
+
+    @property
+    def window_s(self) -> float:
+        """How long that is [s]."""
+        return min(self.ticks, _window_ticks(self.period_s)) * self.period_s
+
+    @cached_property
+    def balance(self) -> Balance:
+        """Where hand and springs balance at the end."""
+        return balance(self.options, self.config.scene.walls)
+
+    @cached_property
+    def outcome(self) -> Outcome:
+        """What became of it."""
+        if self.diverged:
+            return Outcome.DIVERGED
+        if self.fault is not None:
+            return Outcome.STOPPED
+        if math.isnan(self.balance.x_m):
+            return Outcome.RUNS
+        return Criterion().outcome(self.options, self.balance, self.peak_to_peak_m, self.mean_m)
+
+    @property
+    def settled_tick(self) -> int | None:
+        """The first tick from which on it stayed where it should rest; None when it does not or has no such place."""
+        stayed = self.fault is None and self.left_place_tick < self.ticks - 1
+        return self.left_place_tick + 1 if stayed else None
+
+    @property
+    def settled_s(self) -> float:
+        """The settling time: that of `settled_tick`; NaN when there is none [s]."""
+        return math.nan if self.settled_tick is None else self.settled_tick * self.period_s
 
     @cached_property
     def peak_to_peak_m(self) -> float:
         """Span of the true position at the end [m]."""
-        last = self.x_m[self.window]
-        return max(last) - min(last)
+        return _span(self._last("x_m"))
+
+    @cached_property
+    def measured_peak_to_peak_m(self) -> float:
+        """Span of the measured position at the end [m]."""
+        return _span(self._last("x_measured_m"))
 
     @cached_property
     def mean_m(self) -> float:
         """Mean of the true position at the end [m]."""
-        return float(np.mean(self.x_m[self.window]))
+        last: array[float] = self._last("x_m")
+        return sum(last) / len(last)
 
     @cached_property
-    def verdict(self) -> str:
-        """What became of it, in the words of every study; a hand that never rests leaves only whether it ran."""
-        if self.fault is not None:
-            return "diverged" if "diverged" in self.fault else "stopped"
-        if math.isnan(self.balance.x_m):
-            return "runs"
-        return Criterion().outcome(self.options, self.balance, self.peak_to_peak_m, self.mean_m).words
-
-    @cached_property
-    def settled_s(self) -> float:
-        """From when on it stayed near the place where it rests; NaN when it does not rest [s]."""
-        if self.verdict not in (Outcome.SETTLED.words, Outcome.ELSEWHERE.words):
-            return math.nan
-        x = np.asarray(self.x_m)
-        still_m = Criterion().still_limit_m(self.options)
-        band = max(SETTLING_BAND * abs(float(x[0]) - self.mean_m), SETTLING_BAND * abs(self.mean_m), still_m)
-        outside = np.flatnonzero(np.abs(x - self.mean_m) > band)
-        return float((outside[-1] + 1) if len(outside) else 0) * self.period_s
-
-    @cached_property
-    def displayed_n_per_m(self) -> float:
+    def displayed_stiffness_n_per_m(self) -> float:
         """Mean force over mean true depth in contact, at the end; NaN without contact [N/m]."""
-        inside = np.asarray(self.inside[self.window]) > 0
-        depth = -float(np.sum(np.asarray(self.x_m[self.window])[inside]))
-        return float(np.sum(np.asarray(self.force_n[self.window])[inside])) / depth if depth > 0.0 else math.nan
+        return self._displayed("x_m")
 
     @cached_property
-    def peak_n(self) -> float:
-        """Largest force, magnitude [N]."""
-        return float(np.max(np.abs(self.force_n)))
+    def measured_stiffness_n_per_m(self) -> float:
+        """The same over the measured depth, which is what the law sees [N/m]."""
+        return self._displayed("x_measured_m")
 
-    def position_error_m(self, exact: Played) -> float:
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What became of it in numbers; None for what a run does not have."""
+        return {
+            "ticks": self.ticks,
+            "outcome": self.outcome.words,
+            "settled_s": _known(self.settled_s),
+            "window_s": self.window_s,
+            "peak_to_peak_m": self.peak_to_peak_m,
+            "measured_peak_to_peak_m": self.measured_peak_to_peak_m,
+            "mean_depth_m": -self.mean_m,
+            "displayed_stiffness_n_per_m": _known(self.displayed_stiffness_n_per_m),
+            "measured_stiffness_n_per_m": _known(self.measured_stiffness_n_per_m),
+            "commanded_stiffness_n_per_m": _known(self.stiffness_n_per_m),
+            "cycles": self.columns["cycle"][-1],
+            "damping_n_s_per_m": self.columns["damping_n_s_per_m"][-1],
+            "peak_force_n": self.peak_force_n,
+            "energy_j": self.columns["energy_j"][-1],
+            "generated_j": self.generated_j,
+            "dissipated_j": self.dissipated_j,
+            "fault": self.fault,
+        }
+
+    @property
+    def words(self) -> list[str]:
+        """What became of it in some lines."""
+        settled = "" if math.isnan(self.settled_s) else f" after {self.settled_s:.3g} s"
+        outcome = f"settled{settled}" if self.outcome is Outcome.SETTLED else self.outcome.words
+        lines = [
+            f"{outcome}: {self.fault}" if self.fault else outcome,
+            f"last {self.window_s:g} s: {self.peak_to_peak_m * 1e3:.4g} mm peak to peak, "
+            f"mean depth {-self.mean_m * 1e3:.4g} mm",
+        ]
+        if not math.isnan(self.displayed_stiffness_n_per_m):
+            shown = f"{self.displayed_stiffness_n_per_m:.5g} N/m of {self.stiffness_n_per_m:g} N/m"
+            lines.append(f"displayed stiffness {shown}")
+        lines.append(
+            f"{self.columns['cycle'][-1]} cycles, damping {self.columns['damping_n_s_per_m'][-1]:.4g} N s/m, "
+            f"peak force {self.peak_force_n:.4g} N, energy made by the wall {self.generated_j * 1e3:.4g} mJ"
+        )
+        return lines
+
+    def plot(self) -> Figure:
+        """Position, force, energy with the ends of its cycles, and damping over time.
+
+        Raises:
+            HapticdError: matplotlib is not installed.
+        """
+        return draw(self.columns, self._title, self.balance.x_m)
+
+    def position_error_m(self, exact: Run) -> float:
         """Largest distance of the true position from another run [m]; infinite when this one ends early."""
-        return _largest(self.x_m, exact.x_m)
+        return _largest(self.columns["x_m"], exact.columns["x_m"])
 
-    def energy_error_j(self, exact: Played) -> float:
+    def energy_error_j(self, exact: Run) -> float:
         """Largest difference of the energy [J]; infinite when this one ends early."""
-        return _largest(self.energy_j, exact.energy_j)
+        return _largest(self.columns["energy_j"], exact.columns["energy_j"])
 
-    def force_error(self, exact: Played) -> float:
-        """Root mean square of the difference in force over that of the other run; infinite when this one ends early."""
-        if len(self.force_n) < len(exact.force_n):
-            return math.inf
-        wanted = np.asarray(exact.force_n)
-        off = float(np.sqrt(np.mean((np.asarray(self.force_n)[: len(wanted)] - wanted) ** 2)))
-        size = float(np.sqrt(np.mean(wanted**2)))
-        return off / size if size > 0.0 else (0.0 if off == 0.0 else math.inf)
+    def __len__(self) -> int:
+        return self.ticks
+
+    def __repr__(self) -> str:
+        return f"<Run of {self._title}, {self.ticks * self.period_s:g} s: {'; '.join(self.words)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a small plot where matplotlib is installed, and the outcome."""
+        text = html.escape("\n".join([self._title, *self.words]))
+        try:
+            return f"{inline_image(self.plot())}<pre>{text}</pre>"
+        except HapticdError:
+            return f"<pre>{text}</pre>"
+
+    @property
+    def _title(self) -> str:
+        return f"{Path(self.name).name} with {self.config.controller.law}"
+
+    def _last(self, name: str) -> array[Any]:
+        return self.columns[name][self.window]
+
+    def _displayed(self, name: str) -> float:
+        inside = self._last("in_contact")
+        depth_m = -sum([x_m for x_m, touched in zip(self._last(name), inside, strict=True) if touched])
+        force_n = sum([one_n for one_n, touched in zip(self._last("force_n"), inside, strict=True) if touched])
+        return force_n / depth_m if depth_m > 0.0 else math.nan
 
 
-def play(
+def ticks_in(loaded: LoadedConfig, duration_s: float) -> int:
+    """How many ticks a time takes.
+
+    Raises:
+        ConfigError: the time makes no sense.
+    """
+    period_s = loaded.config.loop.period_s
+    if not period_s <= duration_s <= LONGEST_S:
+        raise ConfigError(
+            f"duration = {duration_s:g} s: must be at least one period, {period_s:g} s, and at most {LONGEST_S:g} s"
+        )
+    return round(duration_s / period_s)
+
+
+def rehearse(
     loaded: LoadedConfig,
     duration_s: float,
     options: SimulationOptions | None = None,
     make_device: MakeDevice | None = None,
-) -> Played:
-    """Play a configuration.
+    take: Callable[[Row], object] | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Run:
+    """Run a configuration from the first tick to the last, or to where the model has diverged.
 
     Args:
         loaded: the configuration.
         duration_s: simulated time [s].
         options: of its device; None: the configuration's own.
         make_device: makes the device model; None: the usual one.
+        take: is given every row as it comes; the run then keeps the last half second only.
+        progress: is told now and then how many ticks are done.
 
     Raises:
-        ConfigError: the configuration is not one for a simulated device.
+        ConfigError: the duration makes no sense, or the configuration is not one for a simulated device.
         DriverError: the device cannot be stepped at this rate, or gave not even one sample.
     """
+    ticks = ticks_in(loaded, duration_s)
     rehearsal = Rehearsal(loaded, options, make_device)
-    model, tick = rehearsal.model, rehearsal.tick
+    device = rehearsal.model.options
+    at = balance(device, loaded.config.scene.walls)
+    keep = None if take is None else _window_ticks(rehearsal.period_s)
+    collected = _Collected(at.x_m, Criterion().place_limit_m(device, at), keep)
+    chunk: list[Row] = []
+    for row in _rows(rehearsal, ticks, loaded.config.loop.period_ns):
+        chunk.append(row)
+        if take is not None:
+            take(row)
+        if len(chunk) == _CHUNK_TICKS:
+            collected.add(chunk)
+            chunk.clear()
+            if progress is not None:
+                progress(collected.ticks)
+    collected.add(chunk)
+    if not collected.ticks:
+        raise DriverError(rehearsal.fault or "the device gave no sample")
+    contacts = rehearsal.tick.contacts
+    return Run(
+        name=str(loaded.path),
+        config=loaded.config,
+        options=device,
+        columns=collected.columns,
+        ticks=collected.ticks,
+        left_place_tick=collected.left_place_tick,
+        peak_force_n=collected.peak_n,
+        stiffness_n_per_m=contacts[0].wall.stiffness_n_per_m if contacts else math.nan,
+        generated_j=sum([contact.ledger.generated_j for contact in contacts]),
+        dissipated_j=sum([contact.ledger.dissipated_j for contact in contacts]),
+        fault=rehearsal.fault,
+        diverged=rehearsal.diverged,
+    )
+
+
+def _rows(rehearsal: Rehearsal, ticks: int, period_ns: int) -> Iterator[Row]:
+    tick, model = rehearsal.tick, rehearsal.model
     first = tick.contacts[0] if tick.contacts else None
     axis = first.wall.axis if first else 0
     outward = first.wall.outward if first else 1.0
-    x, v, seen, force, energy = (array("d") for _ in range(5))
-    inside = array("b")
     ledgers = [contact.ledger for contact in tick.contacts]
-    for _ in rehearsal.run(max(1, round(duration_s / rehearsal.period_s))):
-        x.append(model.x_m)
-        v.append(model.v_m_per_s)
-        seen.append(model.measured_m)
-        force.append(outward * tick.force_n[axis])
-        energy.append(sum([ledger.energy_j for ledger in ledgers]))
-        inside.append(first.in_contact if first else 0)
-    if not x:
-        raise DriverError(rehearsal.fault or "the device gave no sample")
-    return Played(
-        options=model.options,
-        period_s=rehearsal.period_s,
-        balance=balance(model.options, loaded.config.scene.walls),
-        x_m=x,
-        v_m_per_s=v,
-        measured_m=seen,
-        force_n=force,
-        energy_j=energy,
-        inside=inside,
-        fault=rehearsal.fault,
-    )
+    for count in rehearsal.run(ticks):
+        yield Row(
+            count * period_ns / 1e9,
+            model.x_m,
+            model.v_m_per_s,
+            first.x_m if first else tick.motion.position_m[0],
+            outward * tick.force_n[axis],
+            outward * tick.requested_n[axis],
+            sum([ledger.energy_j for ledger in ledgers]),
+            first.ledger.cycle if first else 0,
+            first.damping_n_s_per_m if first else 0.0,
+            int(first.in_contact) if first else 0,
+        )
+
+
+class _Collected:
+    """Rows as columns, and what must be known of those that are not kept."""
+
+    def __init__(self, rest_m: float, band_m: float, keep: int | None) -> None:
+        self.columns: dict[str, array[Any]] = {name: array(_CODES.get(name, "d")) for name in Row._fields}
+        self.ticks = 0
+        self.left_place_tick = -1
+        self.peak_n = 0.0
+        self._rest_m = rest_m
+        self._band_m = band_m
+        self._keep = keep
+
+    def add(self, rows: list[Row]) -> None:
+        """Take rows in."""
+        for column, values in zip(self.columns.values(), zip(*rows, strict=True), strict=False):
+            column.extend(values)
+            if self._keep is not None:
+                del column[: -self._keep]
+        self.peak_n = max([self.peak_n, *(abs(row.force_n) for row in rows)])
+        for at in reversed(range(len(rows))):
+            if not abs(rows[at].x_m - self._rest_m) <= self._band_m:  # also where there is no place to rest
+                self.left_place_tick = self.ticks + at
+                break
+        self.ticks += len(rows)
+
+
+def _window_ticks(period_s: float) -> int:
+    return max(1, round(Criterion().window_s / period_s))
+
+
+def _span(values: array[float]) -> float:
+    return max(values) - min(values)
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def _largest(values: array[float], exact: array[float]) -> float:
     if len(values) < len(exact):
         return math.inf
-    return float(np.max(np.abs(np.asarray(values)[: len(exact)] - np.asarray(exact)), initial=0.0))
+    return max((abs(value - true) for value, true in zip(values, exact, strict=False)), default=0.0)

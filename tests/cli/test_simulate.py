@@ -17,7 +17,8 @@ import pytest
 
 from hapticd.config.loading import load, parse
 from hapticd.offline import traces
-from hapticd.offline.run import OfflineRun, Row
+from hapticd.offline.run import Row
+from hapticd.offline.simulate import simulate as run_offline
 from hapticd.offline.traces import open_trace
 from hapticd.paths import directory
 from tests.daemon.running import Daemon, all_records, wait_until
@@ -58,7 +59,7 @@ def rows_of(path: Path) -> list[dict[str, float]]:
 
 def rows(config: Path, duration_s: float) -> list[Row]:
     kept: list[Row] = []
-    OfflineRun(load(config), duration_s).run(kept.append)
+    run_offline(load(config), duration_s, take=kept.append)
     return kept
 
 
@@ -96,7 +97,7 @@ def test_the_numbers_are_the_daemons_to_the_last_bit() -> None:
         wait_until(lambda: len(all_records(memory)) > 1500, "1500 ticks")
         records = {record.seq: record for record in all_records(memory)}
     kept: list[Row] = []
-    OfflineRun(parse(config, "lab.toml"), 1.5).run(kept.append)
+    run_offline(parse(config, "lab.toml"), 1.5, take=kept.append)
     assert kept[-1].cycle > 3
     for seq, row in enumerate(kept):
         record = records[seq]

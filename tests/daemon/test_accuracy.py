@@ -12,8 +12,7 @@ from hapticd.cli.watch.screen import frame
 from hapticd.cli.watch.state import ScreenState
 from hapticd.config.loading import load, parse
 from hapticd.loop.memory import RECORDS
-from hapticd.offline.model_choice import track
-from hapticd.offline.run import play
+from hapticd.offline.run import rehearse
 from hapticd.paths import directory
 from hapticd.simulation.options import SimulationOptions
 from hapticd.telemetry.records import Status
@@ -53,7 +52,7 @@ def test_the_daemon_errs_by_no_more_than_was_allowed(position_m: float, least_er
     """And by something: the model that runs is not the full one."""
     full = parse(CONFIG.format(accuracy=""), "full.toml")
     assert isinstance(full.options, SimulationOptions)
-    exact = track(full, full.options, TICKS)
+    exact = rehearse(full, TICKS * 1e-3)
     text = CONFIG.format(accuracy=f"accuracy = {{ position_m = {position_m}, over_s = 2.5 }}")
     with Daemon(text) as daemon, Subscriber(daemon.wait_ready().endpoint) as subscriber:
         records = first_ticks(daemon, TICKS)
@@ -79,7 +78,7 @@ def test_the_smallest_model_of_a_scene_answers_in_the_daemon_as_the_full_one() -
     tolerance, ticks = 0.05, 1500
     full = load(directory("config") / "every-term.toml")
     scene = study(full, 1.5, tolerance, lambda _: None)
-    exact = play(full, 1.5)
+    exact = rehearse(full, 1.5)
     with Daemon(scene.minimal.text) as daemon:
         records = first_ticks(daemon.wait_ready(), ticks)
     off = sum((record.force_n[0] - exact.force_n[record.seq]) ** 2 for record in records)
@@ -88,5 +87,5 @@ def test_the_smallest_model_of_a_scene_answers_in_the_daemon_as_the_full_one() -
     last_n, depth_m = records[-1].force_n[0], -records[-1].position_m[0]
     assert 0.0 < math.sqrt(off / size) <= tolerance
     assert 0.0 < worst_j <= tolerance * max(map(abs, exact.energy_j))
-    assert last_n / depth_m == pytest.approx(exact.displayed_n_per_m, rel=tolerance)
+    assert last_n / depth_m == pytest.approx(exact.displayed_stiffness_n_per_m, rel=tolerance)
     assert scene.minimal_operations < 0.7 * scene.operations

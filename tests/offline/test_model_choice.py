@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from hapticd.cli import main
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import ConfigError
-from hapticd.offline.model_choice import OMISSIONS, fit, fitted, omissions, track, without
+from hapticd.offline.model_choice import OMISSIONS, fit, fitted, omissions, without
+from hapticd.offline.run import rehearse
 from hapticd.simulation.options import SimulationOptions
 from tests.examples import examples
 
@@ -42,12 +43,11 @@ def errors(loaded: LoadedConfig) -> tuple[float, float]:
     full = config("")
     assert isinstance(full.options, SimulationOptions)
     assert isinstance(loaded.options, SimulationOptions)
-    ticks = 500
-    truth, found = track(full, full.options, ticks), track(full, loaded.options, ticks)
-    assert len(truth.x_m) == len(found.x_m) == ticks
+    truth, found = rehearse(full, 0.5), rehearse(full, 0.5, loaded.options)
+    assert truth.ticks == found.ticks == 500
     return (
-        max(abs(a - b) for a, b in zip(truth.x_m, found.x_m, strict=True)),
-        max(abs(a - b) for a, b in zip(truth.energy_j, found.energy_j, strict=True)),
+        max(abs(a - b) for a, b in zip(truth.columns["x_m"], found.columns["x_m"], strict=True)),
+        max(abs(a - b) for a, b in zip(truth.columns["energy_j"], found.columns["energy_j"], strict=True)),
     )
 
 
@@ -116,6 +116,28 @@ def test_a_device_with_nothing_to_leave_out_keeps_its_exact_step() -> None:
     assert found is not None
     assert (found.omitted, found.options.integrator, found.rehearsed) == ((), "exact", 1)
     assert found.reason == "exact step of every term: nothing else costs less"
+
+
+def test_another_integrator_is_taken_where_friction_makes_the_exact_step_dear() -> None:
+    """Every stop and turn of a hand that presses and lets go is exact only at a price that 0.1 mm need not pay."""
+    text = """
+        [device.options]
+        initial_position_m = 0.005
+        coulomb_n = 0.3
+        accuracy = { position_m = 1e-4, over_s = 0.5 }
+        [device.options.hand]
+        force = { profile = "press-and-release", newton = -3.0, period_s = 0.3 }
+        mass_kg = 0.1
+        damping_n_s_per_m = 2.0
+        stiffness_n_per_m = 100.0
+        [[scene.walls]]
+        stiffness_n_per_m = 2000.0
+        """
+    found = fit(parse(text, "lab.toml"))
+    assert found is not None
+    assert (found.options.integrator, found.omitted) == ("velocity-verlet", ())
+    assert 1e-6 < found.position_error_m <= 1e-4
+    assert found.operations < 0.6 * found.full_operations
 
 
 def test_without_an_accuracy_nothing_is_chosen() -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
+from array import array
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,8 +18,8 @@ from hypothesis import strategies as st
 
 from hapticd.cli import main
 from hapticd.config.loading import load, parse
-from hapticd.offline.run import play
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
+from hapticd.offline.run import Run, rehearse
 from hapticd.paths import directory
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
@@ -295,16 +297,19 @@ def test_every_verdict_is_right_or_false_and_every_cycle_seen_or_missed(ends: li
     assert judge(ends, ends).false == judge(ends, ends).missed == 0
 
 
+def moved(run: Run, x_m: list[float]) -> Run:
+    """The run with another true position."""
+    return replace(run, columns={**run.columns, "x_m": array("d", x_m)})
+
+
 def test_true_cycles_are_turns_of_the_true_motion() -> None:
     """Three swings inside the wall, then one out of it: four ends, and a tremor smaller than the sensor's step none."""
-    played = play(parse(LAB, "lab.toml"), 0.1)
+    run = rehearse(parse(LAB, "lab.toml"), 0.1)
     swing = [-1e-3 + 5e-4 * math.sin(2 * math.pi * (tick / 50 - 0.25)) for tick in range(175)]
     out = list(np.linspace(swing[-1], 1e-3, 25))
     tremor = [-1e-3 + 1e-6 * math.sin(tick) for tick in range(100)]
-    vars(played)["x_m"] = [*swing, *out]
-    assert len(true_ends(played, 1e-5)) == 4
-    vars(played)["x_m"] = tremor
-    assert true_ends(played, 1e-5) == []
+    assert len(true_ends(moved(run, [*swing, *out]), 1e-5)) == 4
+    assert true_ends(moved(run, tremor), 1e-5) == []
 
 
 def test_batches_trade_waiting_against_messages() -> None:

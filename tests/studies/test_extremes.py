@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from hapticd import plugins
 from hapticd.cli import main
 from hapticd.errors import ConfigError
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.plant import epochs
 from hapticd_studies.boundaries import damper_limit, spring_limit

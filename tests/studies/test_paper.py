@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from array import array
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
@@ -16,13 +17,13 @@ import pytest
 
 from hapticd.cli import main
 from hapticd.config.loading import load
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import Outcome
 from hapticd.paths import directory
 from hapticd_studies.paper import readings, study
 from hapticd_studies.paper.claims import Claim, Evidence
 from hapticd_studies.paper.judge import judge
 from hapticd_studies.paper.plates import PLATES
-from hapticd_studies.paper.recording import Recording
+from hapticd_studies.paper.recording import record
 from hapticd_studies.paper.runs import Runs
 from hapticd_studies.paper.scenarios import SCENARIOS
 
@@ -123,7 +124,8 @@ def soften(evidence: Evidence) -> None:
 
 def drain(evidence: Evidence) -> None:
     run = evidence.long["fig9-18-continuous"]
-    run.energy_j -= 1e-3 * run.t_s
+    energy_j = run.columns["energy_j"]
+    energy_j[:] = array("d", run.energy_j - 1e-3 * run.t_s)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +181,7 @@ def test_what_is_injected_less_what_is_recovered_is_the_energy_at_the_end(eviden
 def test_the_window_of_a_recording_finds_the_cycles_of_the_ledger(evidence: Evidence) -> None:
     for name in ("fig3", "fig6-set1", "fig9-12", "fig9-20"):
         run = evidence.runs[name]
-        assert len(run.cycle_ends(2)) == run.summary.cycles, name
+        assert len(run.cycle_ends(2)) == run.cycle[-1], name
 
 
 def test_cycle_ends_are_minima(evidence: Evidence) -> None:
@@ -286,7 +288,7 @@ def test_the_overview_of_studies_imports_none() -> None:
 
 def test_a_run_that_never_settles_says_so() -> None:
     scenario = replace(SCENARIOS["fig8"], name="short", duration_s=1.0)
-    figures = Recording(scenario).figures()
+    figures = record(scenario).figures()
     assert figures.settled_s is None
     assert figures.outcome == Outcome.MOVING.words
     assert not figures.imperceptible

@@ -14,10 +14,11 @@ import pytest
 from hapticd import plugins
 from hapticd.cli import main
 from hapticd.config.loading import parse
-from hapticd.offline.law_spec import LawSpec
-from hapticd.offline.run import OfflineRun
-from hapticd.offline.verdict import Criterion, Outcome
+from hapticd.offline.outcome import Criterion, Outcome
+from hapticd.offline.presses import judge
+from hapticd.offline.simulate import simulate
 from hapticd.simulation.batch import Batch
+from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.paper.scenarios import TDPA_AS_PUBLISHED
 from hapticd_studies.robustness.devices import DURATION_S, Device, draw
 from hapticd_studies.robustness.readings import PAPER, every_reading, params_on, short
@@ -80,12 +81,13 @@ def test_the_configuration_of_a_device_runs_it_to_the_same_place(index: int) -> 
     ][index]
     device = min(filter(wanted, DEVICES), key=lambda one: one.rate_hz)
     loaded = parse(device.config("energy-cycle", {"window": 2}), "device.toml")
-    summary = OfflineRun(loaded, DURATION_S).run(lambda row: None)
+    run = simulate(loaded, DURATION_S)
     point = device.point(loaded.params, Criterion())
     result = Batch(loaded.law, [point], DURATION_S, ledger=False).run_interpreted()
-    assert summary.damping_n_s_per_m == result.damping_n_s_per_m[0]
-    assert summary.peak_to_peak_m == result.peak_to_peak_m[0]
-    assert summary.mean_depth_m == pytest.approx(result.mean_depth_m[0], rel=1e-12)
+    assert run.damping_n_s_per_m[-1] == result.damping_n_s_per_m[0]
+    assert run.peak_to_peak_m == result.peak_to_peak_m[0]
+    assert -run.mean_m == pytest.approx(result.mean_depth_m[0], rel=1e-12)
+    assert (run.settled_s, run.outcome) == (result.settled_s[0], judge(Criterion(), [point], result)[0])
 
 
 def test_a_device_with_a_wall_beyond_the_damper_peak_is_beyond_reach() -> None:

@@ -14,8 +14,8 @@ import tomlkit
 
 from hapticd.cli import main
 from hapticd.config.loading import LoadedConfig, load, parse
-from hapticd.offline.run import play
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
+from hapticd.offline.run import rehearse
 from hapticd.paths import directory
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.scene.answers import answers
@@ -143,12 +143,12 @@ def test_what_matters_stays_and_what_does_not_goes() -> None:
 def test_the_smallest_model_keeps_every_answer_and_nothing_more_can_go() -> None:
     """Not even what could not go alone: the sensor's steps are needed by a filter that itself is not."""
     scene = study(every_term(), SECONDS, 0.05, lambda _: None)
-    full = play(every_term(), SECONDS)
-    assert not answers(play(scene.minimal, SECONDS), full).broken(0.05)
+    full = rehearse(every_term(), SECONDS)
+    assert not answers(rehearse(scene.minimal, SECONDS), full).broken(0.05)
     assert scene.proven
     for term in terms_of(scene.minimal):
         smaller = reduced(scene.minimal, [term])
-        assert answers(play(smaller, SECONDS), full).broken(0.05), f"{term.name} could go as well"
+        assert answers(rehearse(smaller, SECONDS), full).broken(0.05), f"{term.name} could go as well"
     steps = next(one for one in scene.removals if one.term.name == "sensor steps")
     assert steps.broken
     assert steps.term in scene.left_out
@@ -157,9 +157,9 @@ def test_the_smallest_model_keeps_every_answer_and_nothing_more_can_go() -> None
 def test_with_no_tolerance_only_what_changes_nothing_at_all_goes() -> None:
     scene = study(every_term(), SECONDS, 0.0, lambda _: None)
     assert {"wall 1", "force limit"} <= {term.name for term in scene.left_out}
-    exact, least = play(every_term(), SECONDS), play(scene.minimal, SECONDS)
-    assert least.x_m == exact.x_m
-    assert least.force_n == exact.force_n
+    exact, least = rehearse(every_term(), SECONDS), rehearse(scene.minimal, SECONDS)
+    assert least.columns["x_m"] == exact.columns["x_m"]
+    assert least.columns["force_n"] == exact.columns["force_n"]
 
 
 def test_a_looser_tolerance_never_needs_more() -> None:

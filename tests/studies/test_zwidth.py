@@ -17,11 +17,11 @@ import pytest
 
 from hapticd.cli import main
 from hapticd.config.loading import parse
-from hapticd.offline.law_spec import parse_laws
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
 from hapticd_studies.boundaries import passive_limit, stable_limit
 from hapticd_studies.grid import job
 from hapticd_studies.grid.journal import Row
+from hapticd_studies.law_spec import parse_laws
 from hapticd_studies.zwidth import sweep
 from hapticd_studies.zwidth.plane import QUANTITIES, parse_axis
 from hapticd_studies.zwidth.scenario import scenario_of, with_values

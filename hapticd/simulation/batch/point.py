@@ -21,8 +21,8 @@ class Point:
         period_s: time between ticks [s].
         max_force_n: the guard's limit [N].
         velocity_samples: samples that the velocity difference spans.
-        target_m: where it should settle; None: where hand and springs balance, known for a constant hand only [m].
-        band_m: settled means within this of the target; None: 5 % of it, at least three counts [m].
+        target_m: where it should settle; NaN: nowhere, then no settling time is looked for [m].
+        band_m: settled means within this of the target [m].
     """
 
     device: SimulationOptions
@@ -31,5 +31,5 @@ class Point:
     period_s: float = 1e-3
     max_force_n: float = math.inf
     velocity_samples: int = 1
-    target_m: float | None = None
-    band_m: float | None = None
+    target_m: float = math.nan
+    band_m: float = 0.0

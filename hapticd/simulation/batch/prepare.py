@@ -13,7 +13,6 @@ from hapticd.simulation.batch.kernel import LoopState
 from hapticd.simulation.batch.point import Point
 from hapticd.simulation.compiler.compile import param_kinds
 from hapticd.simulation.compiler.specialise import specialise
-from hapticd.simulation.options import ConstantForce
 from hapticd.simulation.plant import delay_line, epochs, recorded_points, sense, start_state, terms
 
 
@@ -48,16 +47,12 @@ class Prepared:
         tick.dt_s = period_s
         self.tick = fields_of(tick)
         self.segments = self._segments(point, [first for first, _ in changes])
-        target_m = point.target_m if point.target_m is not None else self._balance_m(point)
-        band_m = point.band_m
-        if band_m is None:
-            band_m = max(0.05 * abs(target_m), 3.0 * device.resolution_m)
         self.params: dict[str, Any] = {
             "dt_s": period_s,
             "limit_n": float(point.max_force_n),
             "samples": point.velocity_samples,
-            "target_m": target_m,
-            "band_m": band_m,
+            "target_m": point.target_m,
+            "band_m": point.band_m,
             "first_segment": 0,
             "end_segment": 0,
             "trace_every": max(1, trace_every),
@@ -97,13 +92,3 @@ class Prepared:
                 }
             )
         return found
-
-    def _balance_m(self, point: Point) -> float:
-        """Where a constant hand, its spring and the wall balance at the end; NaN when that is not known."""
-        force = point.device.hand.force
-        if not isinstance(force, ConstantForce):
-            return math.nan
-        spring = float(self.epochs[-1]["spring_n_per_m"])
-        if force.newton < 0.0:
-            spring += self.segments[-1]["stiffness_n_per_m"]
-        return force.newton / spring if spring > 0.0 else math.nan

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from hapticd.config.loading import LoadedConfig
+from hapticd.offline.outcome import pressing_n
 from hapticd.offline.rehearsal import simulation_options
-from hapticd.offline.verdict import pressing_n
 from hapticd.simulation.plant import flow
 
 STEPS_S = (1e-3, 1e-4, 1e-5)

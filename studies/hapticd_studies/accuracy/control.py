@@ -14,8 +14,9 @@ from hapticd import plugins
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.models import VelocityConfig
 from hapticd.errors import ConfigError
-from hapticd.offline.run import Played, play
-from hapticd.offline.verdict import Criterion, Outcome
+from hapticd.offline import presses
+from hapticd.offline.outcome import Criterion, Outcome
+from hapticd.offline.run import Run, rehearse
 from hapticd.simulation.batch import Batch
 from hapticd.tick.velocity import make_estimator
 from hapticd_studies.accuracy.cost import StepCost, costs
@@ -106,12 +107,12 @@ def measure_rates(loaded: LoadedConfig, duration_s: float, progress: Callable[[s
     runs = []
     for rate_hz in RATES_HZ:
         progress(f"{rate_hz:g} Hz")
-        runs.append(play(at_rate(loaded, rate_hz), duration_s))
+        runs.append(rehearse(at_rate(loaded, rate_hz), duration_s))
     finest, finest_hz = runs[-1], RATES_HZ[-1]
     rows = []
     for rate_hz, run in zip(RATES_HZ, runs, strict=True):
         every = round(finest_hz / rate_hz)
-        same = np.asarray(finest.x_m)[every - 1 :: every]
+        same = finest.x_m[every - 1 :: every]
         ticks = min(len(same), len(run.x_m))
         walls = loaded.config.scene.walls
         try:
@@ -123,9 +124,9 @@ def measure_rates(loaded: LoadedConfig, duration_s: float, progress: Callable[[s
                 rate_hz=rate_hz,
                 cost=rate_hz / RATES_HZ[0],
                 leak_n_s_per_m=0.5 * walls[0].stiffness_n_per_m / rate_hz if walls else math.nan,
-                position_m=float(np.max(np.abs(same[:ticks] - np.asarray(run.x_m)[:ticks]), initial=0.0)),
-                verdict=run.verdict,
-                displayed_n_per_m=run.displayed_n_per_m,
+                position_m=float(np.max(np.abs(same[:ticks] - run.x_m[:ticks]), initial=0.0)),
+                verdict=run.outcome.words,
+                displayed_n_per_m=run.displayed_stiffness_n_per_m,
                 alone_n_per_m=stable_limit(scenario.loop()) if scenario else None,
                 law_n_per_m=_stiffest(loaded, scenario) if scenario else None,
             )
@@ -135,7 +136,7 @@ def measure_rates(loaded: LoadedConfig, duration_s: float, progress: Callable[[s
 
 def measure_velocity(loaded: LoadedConfig, duration_s: float, progress: Callable[[str], object]) -> list[VelocityRow]:
     """Run the configuration with every estimator that fits its rate."""
-    reference = play(loaded, duration_s)
+    reference = rehearse(loaded, duration_s)
     own = loaded.config.velocity
     found = [(name, VelocityConfig.model_validate(keys)) for name, keys in ESTIMATORS]
     found = [
@@ -147,13 +148,13 @@ def measure_velocity(loaded: LoadedConfig, duration_s: float, progress: Callable
     rows = []
     for (name, velocity), cost in zip(found, timed, strict=True):
         progress(name)
-        run = play(replace(loaded, config=loaded.config.model_copy(update={"velocity": velocity})), duration_s)
+        run = rehearse(replace(loaded, config=loaded.config.model_copy(update={"velocity": velocity})), duration_s)
         rows.append(
             VelocityRow(
                 name=name,
                 cost=cost,
                 error_m_per_s=_velocity_error(velocity, reference),
-                verdict=run.verdict,
+                verdict=run.outcome.words,
                 peak_to_peak_m=run.peak_to_peak_m,
                 cycles=_seen(run, 2),
                 default=_same(velocity, own),
@@ -166,8 +167,8 @@ def measure_windows(loaded: LoadedConfig, duration_s: float, progress: Callable[
     """Let detectors with every window watch the configuration, under its law and without one."""
     progress("cycle windows")
     law = plugins.law("none")
-    unaided = play(replace(loaded, law=law, params=law.Params()), duration_s)
-    own = play(loaded, duration_s)
+    unaided = rehearse(replace(loaded, law=law, params=law.Params()), duration_s)
+    own = rehearse(loaded, duration_s)
     return [WindowRow(window, _seen(unaided, window), _seen(own, window)) for window in WINDOWS]
 
 
@@ -191,7 +192,7 @@ def _stiffest(loaded: LoadedConfig, scenario: PressScenario) -> float:
     ]
     result = Batch(loaded.law, points, SETTLING_S, criterion.window_s, ledger=False).run()
     held = 0.0
-    for stiffness, outcome in zip(STIFFNESSES_N_PER_M, criterion.judge(points, result), strict=True):
+    for stiffness, outcome in zip(STIFFNESSES_N_PER_M, presses.judge(criterion, points, result), strict=True):
         if outcome == Outcome.SETTLED:
             held = stiffness
         elif held > 0.0:
@@ -199,7 +200,7 @@ def _stiffest(loaded: LoadedConfig, scenario: PressScenario) -> float:
     return held
 
 
-def _seen(run: Played, window: int) -> Detection:
+def _seen(run: Run, window: int) -> Detection:
     return judge(true_ends(run, least_swing_m(run)), detected_ends(run, window))
 
 
@@ -209,21 +210,23 @@ def _same(one: VelocityConfig, other: VelocityConfig) -> bool:
     return all(getattr(one, key) == getattr(other, key) for key in named)
 
 
-def _estimates(velocity: VelocityConfig, run: Played) -> Iterator[float]:
+def _estimates(velocity: VelocityConfig, run: Run) -> Iterator[float]:
     estimator = make_estimator(velocity, run.options.resolution_m)
-    estimator.start(run.measured_m[0])
-    for x_m, v_m_per_s in zip(run.measured_m, run.v_m_per_s, strict=True):
+    x_measured_m = run.columns["x_measured_m"]
+    estimator.start(x_measured_m[0])
+    for x_m, v_m_per_s in zip(x_measured_m, run.columns["v_m_per_s"], strict=True):
         yield estimator.update(x_m, run.period_s, v_m_per_s)
 
 
-def _velocity_error(velocity: VelocityConfig, run: Played) -> float:
-    inside = np.asarray(run.inside) > 0
-    off = np.array(list(_estimates(velocity, run))) - np.asarray(run.v_m_per_s)
+def _velocity_error(velocity: VelocityConfig, run: Run) -> float:
+    inside = run.in_contact
+    off = np.array(list(_estimates(velocity, run))) - run.v_m_per_s
     return float(np.sqrt(np.mean(off[inside] ** 2))) if inside.any() else math.nan
 
 
-def _estimating(velocity: VelocityConfig, run: Played) -> Callable[[], object]:
+def _estimating(velocity: VelocityConfig, run: Run) -> Callable[[], object]:
     """Estimates, one a call, on a slow movement such as windows grow long in."""
     estimator = make_estimator(velocity, run.options.resolution_m)
-    estimator.start(run.measured_m[-1])
-    return partial(estimator.update, run.measured_m[-1], run.period_s, 0.0)
+    last_m = run.columns["x_measured_m"][-1]
+    estimator.start(last_m)
+    return partial(estimator.update, last_m, run.period_s, 0.0)

@@ -8,7 +8,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hapticd.offline.run import Played
+from hapticd.offline.run import Run
 from hapticd.tick.energy import CycleFields, cycle_ended
 
 
@@ -31,7 +31,7 @@ class Detection:
     late_ticks: float
 
 
-def true_ends(run: Played, least_m: float) -> list[int]:
+def true_ends(run: Run, least_m: float) -> list[int]:
     """Ticks at which a press and release really ended, by the true position.
 
     That is an outer turning point inside the wall, or the last tick in contact, after a press and a release that
@@ -41,7 +41,7 @@ def true_ends(run: Played, least_m: float) -> list[int]:
     deepest = highest = math.inf
     at = -1
     released = False
-    for tick, x_m in enumerate(run.x_m):
+    for tick, x_m in enumerate(run.columns["x_m"]):
         if x_m >= 0.0:
             if released or (deepest < -least_m):
                 ends.append(at if released and highest > x_m else tick)
@@ -62,16 +62,19 @@ def true_ends(run: Played, least_m: float) -> list[int]:
     return ends
 
 
-def detected_ends(run: Played, window: int) -> list[int]:
+def detected_ends(run: Run, window: int) -> list[int]:
     """Ticks at which the detector says that a cycle has ended, from the measured positions as the daemon has them."""
     state = CycleFields()
     state.window_energy_j = state.window_minimum_j = 0.0
     state.window_falls = state.window_rises = 0
     found = []
     energy_j = 0.0
-    last_m = run.measured_m[0]
+    x_measured_m = run.columns["x_measured_m"]
+    last_m = x_measured_m[0]
     applied_n = 0.0
-    for tick, (x_m, force_n, inside) in enumerate(zip(run.measured_m, run.force_n, run.inside, strict=True)):
+    for tick, (x_m, force_n, inside) in enumerate(
+        zip(x_measured_m, run.columns["force_n"], run.columns["in_contact"], strict=True)
+    ):
         energy_j -= applied_n * (x_m - last_m)
         if cycle_ended(state, energy_j, bool(inside), window, window):
             found.append(tick)
@@ -102,6 +105,6 @@ def judge(true: Sequence[int], detected: Sequence[int]) -> Detection:
     )
 
 
-def least_swing_m(run: Played) -> float:
+def least_swing_m(run: Run) -> float:
     """The smallest swing that counts as one: two steps of the sensor, or seven times its noise [m]."""
     return max(2.0 * run.options.resolution_m, 7.0 * run.options.noise_m, 1e-9)

@@ -10,9 +10,9 @@ import numpy as np
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.offline.model_choice import operations
+from hapticd.offline.outcome import pressing_n
 from hapticd.offline.rehearsal import simulation_options
-from hapticd.offline.run import Played, play
-from hapticd.offline.verdict import pressing_n
+from hapticd.offline.run import Run, rehearse
 from hapticd_studies.accuracy.cost import StepCost, costs
 from hapticd_studies.accuracy.leak import Leak, leak
 from hapticd_studies.accuracy.settings import Setting, default_name, settings_of
@@ -63,7 +63,7 @@ class ModelStudy:
 
     rows: Sequence[ModelRow]
     default: str
-    reference: Played
+    reference: Run
 
     def choice(self, below_m: float) -> ModelRow:
         """The cheapest setting whose error of position in the loop is below this [m]."""
@@ -87,11 +87,12 @@ def measure_model(loaded: LoadedConfig, duration_s: float, progress: Callable[[s
     options = simulation_options(loaded)
     settings = list(settings_of(options))
     period_s = loaded.config.loop.period_s
-    played = []
+    runs = []
     for setting in settings:
         progress(setting.name)
-        played.append(play(loaded, duration_s, setting.options, setting.make_device))
-    reference = played[0]
+        runs.append(rehearse(loaded, duration_s, setting.options, setting.make_device))
+    reference = runs[0]
+    force_n = reference.columns["force_n"]
     steppers = [_stepper(setting, reference) for setting in settings]
     timed = costs([step for step, _ in steppers], lambda: progress("timing"), idle=steppers[0][1])
     rows = [
@@ -100,35 +101,36 @@ def measure_model(loaded: LoadedConfig, duration_s: float, progress: Callable[[s
             family=setting.family,
             cost=cost,
             operations=(
-                operations(setting.options, period_s, reference.force_n)
+                operations(setting.options, period_s, force_n)
                 if setting.counted
-                else operations(reference.options, period_s, reference.force_n) * cost.ns / timed[0].ns
+                else operations(reference.options, period_s, force_n) * cost.ns / timed[0].ns
             ),
             same_forces_m=_same_forces_m(setting, reference),
             position_m=run.position_error_m(reference),
             energy_j=run.energy_error_j(reference),
             leak=_leak(loaded, setting),
-            verdict=run.verdict,
-            displayed_n_per_m=run.displayed_n_per_m,
+            verdict=run.outcome.words,
+            displayed_n_per_m=run.displayed_stiffness_n_per_m,
             offered=setting.offered,
             best=False,
         )
-        for setting, cost, run in zip(settings, timed, played, strict=True)
+        for setting, cost, run in zip(settings, timed, runs, strict=True)
     ]
     return ModelStudy(_marked(rows), default_name(options), reference)
 
 
-def _stepper(setting: Setting, reference: Played) -> tuple[Callable[[], object], Callable[[], object]]:
+def _stepper(setting: Setting, reference: Run) -> tuple[Callable[[], object], Callable[[], object]]:
     """The period in which the exact run was fastest, again and again, and what this does besides that period.
 
     A device at rest would cost less than it does in use.
     """
     device = setting.make_device(setting.options, reference.period_s)
     fastest = int(np.argmax(np.abs(reference.v_m_per_s)))
-    for command_n in [0.0, *reference.force_n][: fastest + 1]:
+    force_n = reference.columns["force_n"]
+    for command_n in [0.0, *force_n][: fastest + 1]:
         device.advance(command_n)
     state = vars(device)["_state"]
-    x_m, v_m_per_s, command_n = state.x_m, state.v_m_per_s, reference.force_n[fastest]
+    x_m, v_m_per_s, command_n = state.x_m, state.v_m_per_s, force_n[fastest]
 
     def step() -> None:
         state.x_m, state.v_m_per_s = x_m, v_m_per_s
@@ -140,10 +142,10 @@ def _stepper(setting: Setting, reference: Played) -> tuple[Callable[[], object],
     return step, idle
 
 
-def _same_forces_m(setting: Setting, reference: Played) -> float:
+def _same_forces_m(setting: Setting, reference: Run) -> float:
     device = setting.make_device(setting.options, reference.period_s)
     largest = 0.0
-    for command_n, exact_m in zip([0.0, *reference.force_n], reference.x_m, strict=False):
+    for command_n, exact_m in zip([0.0, *reference.columns["force_n"]], reference.columns["x_m"], strict=False):
         device.advance(command_n)
         if not abs(device.x_m) < math.inf:
             return math.inf

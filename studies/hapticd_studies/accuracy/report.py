@@ -10,7 +10,7 @@ from typing import Any
 from rich.table import Table
 
 import hapticd
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
 from hapticd_studies.accuracy.continuous import BounceRow
 from hapticd_studies.accuracy.control import SETTLING_S, STIFFNESSES_N_PER_M, RateRow, VelocityRow, WindowRow
 from hapticd_studies.accuracy.cycles import Detection

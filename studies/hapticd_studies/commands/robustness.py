@@ -40,7 +40,7 @@ def command(
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)
-    from hapticd.offline.law_spec import parse_laws
+    from hapticd_studies.law_spec import parse_laws
     from hapticd_studies.robustness.readings import SHORT, every_reading, short
 
     if only is not None:
@@ -55,7 +55,7 @@ def command(
     folder = output or Path("robustness")
     require_folder(folder, _FILES)
 
-    from hapticd.offline.verdict import Criterion
+    from hapticd.offline.outcome import Criterion
     from hapticd_studies.grid.run import kept, run
     from hapticd_studies.robustness.plot import draw
     from hapticd_studies.robustness.report import report
@@ -103,8 +103,8 @@ def command(
 
 
 def _replay(only: str, laws: str, output: Path | None) -> None:
-    from hapticd.offline.law_spec import parse_laws
-    from hapticd.offline.verdict import Criterion
+    from hapticd.offline.outcome import Criterion
+    from hapticd_studies.law_spec import parse_laws
     from hapticd_studies.robustness.devices import DURATION_S
     from hapticd_studies.robustness.readings import PAPER, every_reading
     from hapticd_studies.robustness.replay import device_of, outcomes, write_files

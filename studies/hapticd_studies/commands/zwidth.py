@@ -58,9 +58,9 @@ def command(
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)
 
-    from hapticd.offline.law_spec import parse_laws
-    from hapticd.offline.verdict import Criterion
+    from hapticd.offline.outcome import Criterion
     from hapticd_studies.grid.run import kept, run
+    from hapticd_studies.law_spec import parse_laws
     from hapticd_studies.zwidth.plane import QUANTITIES, parse_axis
     from hapticd_studies.zwidth.plot import draw
     from hapticd_studies.zwidth.report import report

@@ -18,7 +18,8 @@ from numba import njit
 
 from hapticd import plugins
 from hapticd.config.models import WallConfig
-from hapticd.offline.verdict import Criterion, Outcome
+from hapticd.offline.outcome import Criterion, Outcome
+from hapticd.offline.presses import judge
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point
 from hapticd.simulation.compiler.compile import OPTIONS, compiled
 from hapticd.simulation.compiler.threads import in_threads
@@ -165,7 +166,7 @@ def _examined(old: Any) -> list[list[tuple[Outcome, float]]]:
             arrays.law_states["damping_n_s_per_m"] = 0.0
             arrays.ledgers[:] = old.ledgers
         batch.run_on(arrays)
-        outcomes = criterion.judge(points, batch.result(arrays))
+        outcomes = judge(criterion, points, batch.result(arrays))
         damping = arrays.law_states["damping_n_s_per_m"]
         found.append([(Outcome(int(one)), float(value)) for one, value in zip(outcomes, damping, strict=True)])
     return found

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import hapticd
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
 from hapticd_studies.extremes.case import DRAWN, LAWS, draw
 from hapticd_studies.extremes.ceilings import Break
 from hapticd_studies.extremes.findings import ExtremesFinding, findings

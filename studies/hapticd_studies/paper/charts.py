@@ -7,7 +7,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import PRESSED
 from hapticd_studies.paper.claims import HELD, Evidence
 from hapticd_studies.paper.starts import HANDS_N, NATIVE_N_PER_M, OSCILLATES_M
 from hapticd_studies.paper.style import BLUE, GREEN, GREY, INK, ORANGE, OUTCOMES, PURPLE, RED, WIDTH_IN
@@ -57,7 +57,7 @@ def tdpa_map(evidence: Evidence) -> Figure:
     for axes in grid[:, 0]:
         axes.set_ylabel("hand force [N]")
     figure.colorbar(spans, ax=grid[0], label="span at the end [mm]", pad=0.01, aspect=14)
-    handles = [Patch(color=OUTCOMES(int(outcome)), label=outcome.words) for outcome in Outcome]
+    handles = [Patch(color=OUTCOMES(int(outcome)), label=outcome.words) for outcome in PRESSED]
     figure.legend(handles=handles, loc="outside lower center", ncol=4)
     return figure
 
@@ -130,7 +130,7 @@ def readings(evidence: Evidence) -> Figure:
     if table.single < rows:
         axes.axhline(table.single, color=INK, lw=1.0)
     axes.axvline(4, color=INK, lw=1.0)
-    handles = [Patch(color=OUTCOMES(int(outcome)), label=outcome.words) for outcome in Outcome]
+    handles = [Patch(color=OUTCOMES(int(outcome)), label=outcome.words) for outcome in PRESSED]
     figure.legend(handles=handles, loc="outside lower center", ncol=4)
     return figure
 

@@ -248,5 +248,5 @@ def _acts_after_s(run: Recording) -> float:
 
 
 def _settles_after_s(run: Recording) -> float:
-    settled = run.settled_tick()
+    settled = run.settled_tick
     return np.inf if settled is None else settled * run.period_s - 1.0

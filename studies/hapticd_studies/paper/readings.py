@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hapticd.config.models import WallConfig
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import Outcome
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.paper.runs import Array, Asked, Runs, law_named

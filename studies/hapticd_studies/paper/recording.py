@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import asdict, dataclass
+import math
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from hapticd.law import plain_object
-from hapticd.offline.run import OfflineRun, Row, Summary
-from hapticd.offline.verdict import Criterion, Outcome, balance
-from hapticd.simulation.options import SimulationOptions
+from hapticd.offline.run import Run
+from hapticd.offline.simulate import simulate
 from hapticd.tick.energy import cycle_ended
 from hapticd_studies.paper.scenarios import PaperScenario
 
 Array = np.ndarray[Any, Any]
-
-SETTLED_SHARE = 0.05
-"""Settled is within this share of the depth, or three counts of the position where that is more."""
 
 STIFFNESS_SHARE = 0.01
 """The displayed stiffness is right within this share, or half a count over the depth where that is more."""
@@ -30,41 +26,20 @@ STILL_M = 1e-5
 """Vibration below this, or below two counts of the position, counts as imperceptible [m]."""
 
 
-class Recording:
+@dataclass(frozen=True, repr=False, eq=False)
+class Recording(Run):
     """A scenario that has been run.
-
-    Args:
-        scenario: what to run.
-        duration_s: for how long, where other than the scenario says [s].
 
     Attributes:
         scenario: what was run.
-        summary: its last half second.
-        t_s, x_m, v_m_per_s, x_measured_m, force_n, energy_j, damping_n_s_per_m, in_contact: a value a tick.
     """
 
-    def __init__(self, scenario: PaperScenario, duration_s: float | None = None) -> None:
-        self.scenario = scenario
-        loaded = scenario.load()
-        assert isinstance(loaded.options, SimulationOptions)
-        self._options = loaded.options
-        self._balance = balance(loaded.options, loaded.config.scene.walls)
-        self.resolution_m = loaded.options.resolution_m
-        rows: deque[Row] = deque()
-        run = OfflineRun(loaded, scenario.duration_s if duration_s is None else duration_s)
-        self.period_s = run.period_s
-        self.summary: Summary = run.run(rows.append)
-        table = np.array(rows)
-        columns = dict(zip(Row._fields, table.T, strict=True))
-        self.t_s: Array = columns["t_s"]
-        self.x_m: Array = columns["x_m"]
-        self.v_m_per_s: Array = columns["v_m_per_s"]
-        self.x_measured_m: Array = columns["x_measured_m"]
-        self.force_n: Array = columns["force_n"]
-        self.energy_j: Array = columns["energy_j"]
-        self.damping_n_s_per_m: Array = columns["damping_n_s_per_m"]
-        self.cycle: Array = columns["cycle"]
-        self.in_contact: Array = columns["in_contact"] > 0.0
+    scenario: PaperScenario
+
+    @property
+    def resolution_m(self) -> float:
+        """Step of the measured position [m]."""
+        return self.options.resolution_m
 
     def flow_j(self) -> Array:
         """Energy into the wall tick by tick [J]; its own increments, so that nothing drowns in the sum."""
@@ -96,14 +71,6 @@ class Recording:
                 state.window_minimum_j = 0.0
         return ends
 
-    def settled_tick(self) -> int | None:
-        """The first tick from which on the true position stays in place; None when it does not."""
-        balance_m = self._balance.x_m
-        band_m = max(SETTLED_SHARE * abs(balance_m), 3.0 * self.resolution_m)
-        outside = np.flatnonzero(np.abs(self.x_m - balance_m) > band_m)
-        first = int(outside[-1]) + 1 if outside.size else 0
-        return first if first < len(self.x_m) else None
-
     def damping_force_n(self) -> Array:
         """What the law adds to the spring inside the wall [N]."""
         spring_n = -self.scenario.stiffness_n_per_m * np.minimum(self.x_measured_m, 0.0)
@@ -112,42 +79,51 @@ class Recording:
 
     def figures(self) -> RunFigures:
         """The numbers of this run."""
-        summary = self.summary
         flow_j = self.flow_j()
-        settled = self.settled_tick()
-        window = round(summary.window_s / self.period_s)
-        before_m = np.ptp(self.x_m[-2 * window : -window]) if len(self.x_m) >= 2 * window else np.nan
-        depth_m = -self._balance.x_m
-        stiffness = summary.displayed_stiffness_n_per_m
+        window = -self.window.start
+        before_m = np.ptp(self.x_m[-2 * window : -window]) if self.ticks >= 2 * window else np.nan
+        depth_m = -self.balance.x_m
+        stiffness = None if math.isnan(self.displayed_stiffness_n_per_m) else self.displayed_stiffness_n_per_m
+        measured = None if math.isnan(self.measured_stiffness_n_per_m) else self.measured_stiffness_n_per_m
         error = None if stiffness is None else stiffness / self.scenario.stiffness_n_per_m - 1.0
-        outcome = Criterion().outcome(self._options, self._balance, summary.peak_to_peak_m, -summary.mean_depth_m)
         still_m = max(2.0 * self.resolution_m, STILL_M)
-        grows = bool(summary.peak_to_peak_m > 1.1 * before_m + self.resolution_m)
+        grows = bool(self.peak_to_peak_m > 1.1 * before_m + self.resolution_m)
         return RunFigures(
-            outcome=Outcome.DIVERGED.words if summary.fault else outcome.words,
-            peak_to_peak_m=summary.peak_to_peak_m,
-            mean_depth_m=summary.mean_depth_m,
-            settled_s=None if settled is None else settled * self.period_s,
-            cycles_to_settle=None if settled is None else int(self.cycle[settled]),
-            cycles=summary.cycles,
-            damping_n_s_per_m=summary.damping_n_s_per_m,
+            outcome=self.outcome.words,
+            peak_to_peak_m=self.peak_to_peak_m,
+            mean_depth_m=-self.mean_m,
+            settled_s=None if self.settled_tick is None else self.settled_s,
+            cycles_to_settle=None if self.settled_tick is None else int(self.cycle[self.settled_tick]),
+            cycles=int(self.cycle[-1]),
+            damping_n_s_per_m=float(self.damping_n_s_per_m[-1]),
             peak_damping_n_s_per_m=float(np.max(np.abs(self.damping_n_s_per_m))),
-            peak_force_n=summary.peak_force_n,
+            peak_force_n=self.peak_force_n,
             energy_injected_j=float(flow_j[flow_j > 0.0].sum()),
             energy_recovered_j=float(-flow_j[flow_j < 0.0].sum()),
-            generated_j=summary.generated_j,
+            generated_j=self.generated_j,
             lowest_energy_j=float(self.energy_j.min()),
             displayed_stiffness_n_per_m=stiffness,
             stiffness_error=error,
             stiffness_tolerance=max(STIFFNESS_SHARE, 0.5 * self.resolution_m / depth_m),
-            measured_stiffness_n_per_m=summary.measured_stiffness_n_per_m,
+            measured_stiffness_n_per_m=measured,
             imperceptible=bool(
-                summary.peak_to_peak_m < still_m * (1.0 + 1e-9)
+                self.peak_to_peak_m < still_m * (1.0 + 1e-9)
                 and not grows
                 and error is not None
                 and abs(error) < STIFFNESS_JND
             ),
         )
+
+
+def record(scenario: PaperScenario, duration_s: float | None = None) -> Recording:
+    """Run a scenario.
+
+    Args:
+        scenario: what to run.
+        duration_s: for how long, where other than the scenario says [s].
+    """
+    run = simulate(scenario.load(), scenario.duration_s if duration_s is None else duration_s)
+    return Recording(**{field.name: getattr(run, field.name) for field in fields(Run)}, scenario=scenario)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +133,7 @@ class RunFigures:
     Attributes:
         outcome: settled in place, still elsewhere, moving or diverged.
         peak_to_peak_m, mean_depth_m: of the true position [m].
-        settled_s: since when it has stayed within 5 % of its depth [s]; None when it does not.
+        settled_s: since when it has stayed in its place [s]; None when it does not.
         cycles_to_settle: completed cycles at that time.
         cycles: completed cycles at the end.
         damping_n_s_per_m, peak_damping_n_s_per_m: of the law, at the end and at most.

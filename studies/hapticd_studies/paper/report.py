@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
 from hapticd_studies.paper.claims import Claim, Evidence, millimetres
 from hapticd_studies.paper.plates import PLATES, Plate
 from hapticd_studies.paper.recording import RunFigures

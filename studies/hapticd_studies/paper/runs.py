@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from hapticd import plugins
-from hapticd.offline.verdict import Criterion, Outcome
+from hapticd.offline.outcome import Criterion, Outcome
+from hapticd.offline.presses import aimed, judge
 from hapticd.simulation.batch import Batch, BatchResult, Point
 
 Array = np.ndarray[Any, Any]
@@ -63,7 +64,7 @@ class Runs:
 
     def ask(self, law: str, points: Sequence[Point]) -> Asked:
         """Want these points under this law."""
-        asked = Asked(points)
+        asked = Asked([aimed(point, Criterion()) for point in points])
         self._asked.setdefault(law, []).append(asked)
         return asked
 
@@ -82,7 +83,7 @@ class Runs:
         for law, every in self._asked.items():
             points = [point for asked in every for point in asked.points]
             result = _result(law, points, duration_s, progress)
-            outcome = Criterion().judge(points, result)
+            outcome = judge(Criterion(), points, result)
             first = 0
             for asked in every:
                 part = slice(first, first + len(asked.points))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import Outcome
 from hapticd_studies.paper.claims import Claim, Evidence, millimetres, percent
 from hapticd_studies.paper.recording import Recording
 from hapticd_studies.paper.starts import MODELS
@@ -35,7 +35,7 @@ def _leak(evidence: Evidence) -> Claim:
     ends_j = run.energy_j[run.cycle_ends(2)]
     falls = int((np.diff(ends_j, prepend=0.0) < 0.0).sum())
     held = np.concatenate(([False], run.in_contact[:-1]))
-    damping = run.summary.generated_j / float((run.velocity()[held] ** 2).sum() * run.period_s)
+    damping = run.generated_j / float((run.velocity()[held] ** 2).sum() * run.period_s)
     predicted = 0.5 * run.scenario.stiffness_n_per_m * run.period_s
     return Claim(
         "leak",

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from hapticd import __version__
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
 from hapticd_studies.grid.output import as_json, write
 from hapticd_studies.paper import readings, starts, style
 from hapticd_studies.paper.claims import HELD, Claim, Evidence
 from hapticd_studies.paper.judge import judge
 from hapticd_studies.paper.plates import PLATES
-from hapticd_studies.paper.recording import Recording
+from hapticd_studies.paper.recording import record
 from hapticd_studies.paper.report import report
 from hapticd_studies.paper.runs import Runs
 from hapticd_studies.paper.scenarios import SCENARIOS
@@ -56,11 +56,11 @@ def gather(extent: Extent, progress: Progress) -> Evidence:
     table = readings.ask(runs, quick=not extent.all_readings)
     recordings = {}
     for name, scenario in SCENARIOS.items():
-        recordings[name] = Recording(scenario)
+        recordings[name] = record(scenario)
         progress(f"running {name}", 0.1 / len(SCENARIOS))
     long = {}
     for name in LONG_RUNS:
-        long[name] = Recording(SCENARIOS[name], extent.long_s)
+        long[name] = record(SCENARIOS[name], extent.long_s)
         progress(f"watching {name}", 0.1 / len(LONG_RUNS))
     progress("compiling the laws", 0.0)
     runs.run(starts.DURATION_S, lambda done: progress(f"{runs.count} runs", 0.6 * done / runs.count))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from random import Random
 from typing import Any
@@ -12,7 +12,8 @@ import tomlkit
 
 from hapticd.config.models import LoopConfig, WallChange, WallConfig
 from hapticd.law import LawParams
-from hapticd.offline.verdict import Criterion, balance_m
+from hapticd.offline.outcome import Criterion
+from hapticd.offline.presses import aimed
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.boundaries import damper_peak
@@ -100,8 +101,7 @@ class Device:
 
     def point(self, params: LawParams, criterion: Criterion) -> Point:
         """The loop under a law, with the place where it should settle."""
-        point = Point(self.options, self.wall, params, self.period_s, MAX_FORCE_N)
-        return replace(point, target_m=balance_m(point), band_m=criterion.place_limit_m(point))
+        return aimed(Point(self.options, self.wall, params, self.period_s, MAX_FORCE_N), criterion)
 
     def config(self, law: str, params: dict[str, Any]) -> str:
         """A configuration that runs it, TOML."""

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import Outcome
 from hapticd_studies import style
 from hapticd_studies.robustness.devices import WITHIN_REACH
 from hapticd_studies.robustness.readings import PAPER, short

@@ -9,8 +9,8 @@ from typing import Any, Literal
 from hapticd import plugins
 from hapticd.errors import PluginError
 from hapticd.law import LawParams
-from hapticd.offline.law_spec import LawSpec
 from hapticd.simulation.compiler.compile import compiled_step
+from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.paper.scenarios import TDPA_AS_PUBLISHED
 from hapticd_studies.robustness.devices import Device
 

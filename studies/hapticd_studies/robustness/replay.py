@@ -12,10 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from hapticd.errors import ConfigError
-from hapticd.offline.law_spec import LawSpec
-from hapticd.offline.verdict import Criterion, balance_m
+from hapticd.offline.outcome import Criterion
+from hapticd.offline.presses import balance_m
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch
 from hapticd_studies.grid.output import as_csv, write
+from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.robustness.devices import DURATION_S, Device, draw
 from hapticd_studies.robustness.plot import draw_one
 from hapticd_studies.robustness.readings import PAPER, params_on

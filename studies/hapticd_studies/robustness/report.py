@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import hapticd
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import Outcome
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.robustness.devices import DRAWN, DURATION_S, WITHIN_REACH, Device
 from hapticd_studies.robustness.readings import PAPER, short

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from hapticd.offline.law_spec import LawSpec
-from hapticd.offline.verdict import Criterion, misplaced_m
+from hapticd.offline.outcome import Criterion
+from hapticd.offline.presses import judge, misplaced_m
 from hapticd.simulation.batch import Batch
 from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
+from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.robustness.devices import DURATION_S, Device, draw
 from hapticd_studies.robustness.readings import params_on
 
@@ -75,7 +76,7 @@ def pressed(devices: Sequence[Device], reading: LawSpec, criterion: Criterion, t
     result = Batch(reading.law, points, DURATION_S, criterion.window_s, ledger=False).run(threads)
     rows: list[Row] = np.array(
         [
-            criterion.judge(points, result),
+            judge(criterion, points, result),
             result.peak_to_peak_m,
             misplaced_m(points, result),
             result.settled_s - [device.last_change_s for device in devices],

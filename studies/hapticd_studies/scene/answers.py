@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from hapticd.offline.run import Played
+import numpy as np
+
+from hapticd.offline.run import Run
 
 _LEAST_SETTLING_S = 0.002
 """Settling times closer than this are the same whatever the tolerance: a tick or two of a threshold [s]."""
@@ -42,19 +44,28 @@ class Answers:
         return found
 
 
-def answers(run: Played, full: Played) -> Answers:
+def answers(run: Run, full: Run) -> Answers:
     """Hold a run against that of the full model."""
-    largest_j = max(map(abs, full.energy_j))
+    largest_j = max(map(abs, full.columns["energy_j"]))
     energy_j = run.energy_error_j(full)
     return Answers(
-        verdict=run.verdict,
-        same_verdict=run.verdict == full.verdict,
+        verdict=run.outcome.words,
+        same_verdict=run.outcome is full.outcome,
         settled_s=run.settled_s,
         settling=_settling(run.settled_s, full.settled_s),
-        force=run.force_error(full),
+        force=force_error(run, full),
         energy=energy_j / largest_j if largest_j > 0.0 else (0.0 if energy_j == 0.0 else math.inf),
-        stiffness=_share(run.displayed_n_per_m, full.displayed_n_per_m),
+        stiffness=_share(run.displayed_stiffness_n_per_m, full.displayed_stiffness_n_per_m),
     )
+
+
+def force_error(run: Run, full: Run) -> float:
+    """Root mean square of the difference in force over that of the full model; infinite when the run ends early."""
+    if run.ticks < full.ticks:
+        return math.inf
+    off = float(np.sqrt(np.mean((run.force_n[: full.ticks] - full.force_n) ** 2)))
+    size = float(np.sqrt(np.mean(full.force_n**2)))
+    return off / size if size > 0.0 else (0.0 if off == 0.0 else math.inf)
 
 
 def _settling(one_s: float, full_s: float) -> float:

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from rich.table import Table
 
 import hapticd
-from hapticd.offline.verdict import Criterion
+from hapticd.offline.outcome import Criterion
 from hapticd_studies.grid.output import as_json
 from hapticd_studies.scene.answers import Answers
 from hapticd_studies.scene.study import Scene
@@ -31,10 +31,10 @@ def table(scene: Scene) -> Table:
         "nothing",
         f"of {scene.operations:.0f}",
         _seconds(full.settled_s),
-        f"{full.peak_n:.3g} N",
+        f"{full.peak_force_n:.3g} N",
         f"{max(map(abs, full.energy_j)):.2g} J",
-        _number(full.displayed_n_per_m),
-        full.verdict,
+        _number(full.displayed_stiffness_n_per_m),
+        full.outcome.words,
     )
     for one in scene.removals:
         if one.answers is None:
@@ -90,10 +90,10 @@ def json(scene: Scene, ticks: Sequence[TickCount], duration_s: float) -> bytes:
             "tolerance": scene.tolerance,
             "criterion": Criterion().declared(),
             "full": {
-                "verdict": scene.full.verdict,
+                "verdict": scene.full.outcome.words,
                 "settled_s": scene.full.settled_s,
-                "peak_force_n": scene.full.peak_n,
-                "displayed_stiffness_n_per_m": scene.full.displayed_n_per_m,
+                "peak_force_n": scene.full.peak_force_n,
+                "displayed_stiffness_n_per_m": scene.full.displayed_stiffness_n_per_m,
                 "operations": scene.operations,
             },
             "terms": [

@@ -8,7 +8,7 @@ from itertools import combinations
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.errors import HapticdError
-from hapticd.offline.run import Played, play
+from hapticd.offline.run import Run, rehearse
 from hapticd_studies.scene.answers import Answers, answers
 from hapticd_studies.scene.terms import Term, reduced, terms_of
 from hapticd_studies.scene.ticks import SETTLE_TICKS, tick_operations
@@ -57,7 +57,7 @@ class Scene:
     """
 
     loaded: LoadedConfig
-    full: Played
+    full: Run
     tolerance: float
     operations: float
     removals: Sequence[Removal]
@@ -99,7 +99,7 @@ class _Search:
         self._tolerance = tolerance
         self._progress = progress
         progress("full model")
-        self._full = play(loaded, duration_s)
+        self._full = rehearse(loaded, duration_s)
         self._operations = self._count(loaded)
         self._tried = 1
 
@@ -109,7 +109,7 @@ class _Search:
         left_out, proven = self._together(able)
         left_out = self._further(left_out, [one.term for one in removals])
         minimal = reduced(self._loaded, left_out)
-        run = play(minimal, self._duration_s)
+        run = rehearse(minimal, self._duration_s)
         return Scene(
             loaded=self._loaded,
             full=self._full,
@@ -163,7 +163,7 @@ class _Search:
     def _answers(self, terms: Sequence[Term]) -> Answers | None:
         self._tried += 1
         try:
-            return answers(play(reduced(self._loaded, terms), self._duration_s), self._full)
+            return answers(rehearse(reduced(self._loaded, terms), self._duration_s), self._full)
         except HapticdError:  # such as a filter that a rate does not fit, or a device that cannot be stepped
             return None
 

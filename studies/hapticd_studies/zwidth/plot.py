@@ -12,7 +12,7 @@ from matplotlib.colors import BoundaryNorm, Colormap, LinearSegmentedColormap, L
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import PRESSED, Outcome
 from hapticd_studies import style
 from hapticd_studies.zwidth.curves import Curve
 from hapticd_studies.zwidth.plane import MapAxis
@@ -53,8 +53,8 @@ def _draw_cells(plan: ZwidthPlan, tables: Sequence[np.ndarray[Any, Any]], found:
             colours = LinearSegmentedColormap.from_list("share", [style.PALE, style.BLUE])
             panel.pcolormesh(*edges, table[:, 1].reshape(shape) / plan.starts, cmap=colours, vmin=0.0, vmax=1.0)
         else:
-            colours = ListedColormap([_COLOURS[outcome] for outcome in Outcome])
-            norm = BoundaryNorm(np.arange(-0.5, len(Outcome)), len(Outcome))
+            colours = ListedColormap([_COLOURS[outcome] for outcome in PRESSED])
+            norm = BoundaryNorm(np.arange(-0.5, len(PRESSED)), len(PRESSED))
             panel.pcolormesh(*edges, table[:, 0].reshape(shape), cmap=colours, norm=norm)
         _curves(panel, plan, found)
         _frame(panel, plan)
@@ -74,7 +74,7 @@ def _draw_cells(plan: ZwidthPlan, tables: Sequence[np.ndarray[Any, Any]], found:
         seen = {int(outcome) for table in tables for outcome in np.unique(table[:, 0])}
         patches = [
             Patch(facecolor=_COLOURS[outcome], edgecolor=style.GREY, linewidth=0.5, label=outcome.words)
-            for outcome in Outcome
+            for outcome in PRESSED
             if outcome in seen
         ]
     figure.legend(handles=[*patches, *_curve_handles(found)], loc="outside lower center", ncols=2 if columns < 3 else 3)

@@ -12,7 +12,7 @@ from rich.table import Table
 
 import hapticd
 from hapticd.config.loading import parse
-from hapticd.offline.verdict import Outcome
+from hapticd.offline.outcome import PRESSED, Outcome
 from hapticd_studies.boundaries import BOUNDARIES
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.zwidth.curves import Curve, curves, limits
@@ -99,7 +99,7 @@ class ZwidthReport:
                 "criterion": plan.criterion.declared(),
                 "x": plan.x.declared(),
                 "y": plan.y.declared(),
-                "outcomes": {str(int(outcome)): outcome.words for outcome in Outcome},
+                "outcomes": {str(int(outcome)): outcome.words for outcome in PRESSED},
                 "laws": [
                     {
                         "law": one.law,

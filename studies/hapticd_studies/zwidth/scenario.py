@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import itertools
-import math
-import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import tomlkit
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.models import WallConfig
+from hapticd.config.values import put
 from hapticd.errors import ConfigError
 from hapticd.law import LawParams
-from hapticd.offline.law_spec import toml_value
-from hapticd.offline.verdict import Criterion, balance_m, coulomb_n, pressing_n
+from hapticd.offline.outcome import Criterion, coulomb_n
+from hapticd.offline.presses import aimed, point_of
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.boundaries import Loop
+from hapticd_studies.law_spec import toml_value
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +42,7 @@ class PressScenario:
     def point(self, params: LawParams, criterion: Criterion) -> Point:
         """The press under a law, with the place where it should settle."""
         point = Point(self.device, self.wall, params, self.period_s, self.max_force_n, self.velocity_samples)
-        return replace(point, target_m=balance_m(point), band_m=criterion.place_limit_m(point))
+        return aimed(point, criterion)
 
     def loop(self) -> Loop:
         """What the analytic limits depend on."""
@@ -68,28 +66,8 @@ def scenario_of(loaded: LoadedConfig) -> PressScenario:
     Raises:
         ConfigError: it is none, or none that the engine can repeat.
     """
-    name, config, device = loaded.path, loaded.config, loaded.options
-    if not isinstance(device, SimulationOptions):
-        raise ConfigError(f'{name}: device.driver = "{config.device.driver}": only a simulated device, try "loopback"')
-    if len(config.scene.walls) != 1:
-        raise ConfigError(f"{name}: scene.walls: has {len(config.scene.walls)} walls; a map needs one")
-    if config.velocity.estimator != "difference":
-        raise ConfigError(f'{name}: velocity.estimator = "{config.velocity.estimator}": a map needs "difference"')
-    if not pressing_n(device) > 0.0:
-        raise ConfigError(
-            f"{name}: device.options.hand.force: must come to rest at a press (newton < 0; constant, step or ramp): "
-            "a map asks where the device settles"
-        )
-    if device.initial_position_m < 0.0:
-        raise ConfigError(
-            f"{name}: device.options.initial_position_m = {device.initial_position_m:g}: must be 0 or more: inside the "
-            "wall the daemon ramps the force up, which the engine of a map leaves out"
-        )
-    limit_n = math.inf
-    if config.safety.profile != "simulation":
-        limits = (config.safety.max_force_n, config.safety.max_axis_force_n, device.max_force_n or math.inf)
-        limit_n = min(limit for limit in limits if limit is not None)
-    return PressScenario(device, config.scene.walls[0], config.loop.period_s, limit_n, config.velocity.samples)
+    point = point_of(loaded)
+    return PressScenario(point.device, point.wall, point.period_s, point.max_force_n, point.velocity_samples)
 
 
 def changing(scenario: PressScenario) -> set[str]:
@@ -116,27 +94,11 @@ def with_values(text: str, name: str, given: Sequence[str], keys: dict[str, str]
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{name}: not TOML: {error}") from None
     for one in given:
-        key, equals, value = one.partition("=")
-        if not equals or not re.fullmatch(r"[A-Za-z0-9_-]+(\[\d+\]|\.[A-Za-z0-9_-]+)*", key.strip()):
+        short, equals, text_value = one.partition("=")
+        if not equals or not short.strip():
             raise ConfigError(f"--set {one}: must be KEY=VALUE, as device.options.mass_kg=0.3")
-        path = keys.get(key.strip(), key.strip())
-        _put(data, path, toml_value(value), one)
+        key, value = keys.get(short.strip(), short.strip()), toml_value(text_value)
+        if key.endswith(".hand.force") and isinstance(value, int | float):
+            value = {"profile": "constant", "newton": -float(value)}
+        put(data, key, value, f"--set {one}")
     return tomlkit.dumps(data)
-
-
-def _put(data: dict[str, Any], path: str, value: Any, given: str) -> None:
-    steps: list[str | int] = [
-        int(step[1:-1]) if step.startswith("[") else step for step in re.findall(r"\[\d+\]|[A-Za-z0-9_-]+", path)
-    ]
-    if path.endswith(".hand.force") and isinstance(value, int | float):
-        value = {"profile": "constant", "newton": -float(value)}
-    place: Any = data
-    try:
-        for step, after in itertools.pairwise(steps):
-            if isinstance(place, dict):
-                place = place.setdefault(step, [] if isinstance(after, int) else {})
-            else:
-                place = place[step]
-        place[steps[-1]] = value
-    except (TypeError, KeyError, IndexError):
-        raise ConfigError(f"--set {given}: the configuration has no such place") from None

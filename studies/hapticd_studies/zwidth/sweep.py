@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from hapticd.config.loading import parse
-from hapticd.offline.law_spec import LawSpec
-from hapticd.offline.verdict import Criterion, Outcome, misplaced_m
+from hapticd.offline.outcome import Criterion, Outcome
+from hapticd.offline.presses import judge, misplaced_m
 from hapticd.simulation.batch import Batch, Point
 from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
+from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.zwidth.plane import MapAxis, axis_of
 from hapticd_studies.zwidth.scenario import PressScenario, scenario_of
 
@@ -152,7 +153,7 @@ class _Press:
     def _pressed(self, places: Sequence[tuple[float, float]]) -> list[Row]:
         points = [point for x, y in places for point in self._points(x, y)]
         result = Batch(self._law, points, self._duration_s, self._criterion.window_s, ledger=False).run(self._threads)
-        outcomes = self._criterion.judge(points, result)
+        outcomes = judge(self._criterion, points, result)
         misplaced = misplaced_m(points, result)
         table = np.array(
             [

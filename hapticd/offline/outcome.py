@@ -1,4 +1,4 @@
-"""When a wall that is pressed counts as stable: the device is still, and it is where hand and springs balance.
+"""What became of a run: settled means that the device is still, and that it is where hand and springs balance.
 
 Stillness alone misleads: a loop may rest millimetres too deep without a tremor. Every study declares the criterion in
 its output.
@@ -12,25 +12,35 @@ from dataclasses import asdict, dataclass
 from enum import IntEnum
 from typing import Any
 
-import numpy as np
-
 from hapticd.config.models import WallConfig
-from hapticd.simulation.batch import BatchResult, Point
 from hapticd.simulation.options import ConstantForce, RampForce, SimulationOptions, StepForce
 
 
 class Outcome(IntEnum):
-    """What became of one press, from good to bad."""
+    """What became of a run.
+
+    The first four, from good to bad, are those of a press that the daemon would run to its end. `STOPPED`: the daemon
+    would have stopped for a fault. `RUNS`: the hand never comes to rest, so there is no place to judge by.
+    """
 
     SETTLED = 0
     ELSEWHERE = 1
     MOVING = 2
     DIVERGED = 3
+    STOPPED = 4
+    RUNS = 5
 
     @property
     def words(self) -> str:
         """For people."""
-        return ("settled", "still, but out of place", "keeps moving", "diverged")[self]
+        return ("settled", "still, but out of place", "keeps moving", "diverged", "stopped", "runs")[self]
+
+    def __str__(self) -> str:
+        return self.words
+
+
+PRESSED = (Outcome.SETTLED, Outcome.ELSEWHERE, Outcome.MOVING, Outcome.DIVERGED)
+"""What a press can come to, from good to bad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +79,8 @@ class Criterion:
         return (
             f"settled: over the last {self.window_s:g} s the true position spans at most {self.still_m * 1e3:g} mm or "
             f"{self.still_counts:g} steps of the sensor, and the mean depth is within {self.place_share * 100.0:g} % "
-            f"or {self.place_counts:g} steps of where hand force and springs balance, friction allowed for"
+            f"or {self.place_counts:g} steps of where hand force and springs balance, friction allowed for; the "
+            "settling time is when the position came that close to stay"
         )
 
     def declared(self) -> dict[str, Any]:
@@ -80,9 +91,11 @@ class Criterion:
         """Largest span of the position that is still [m]."""
         return max(self.still_m, self.still_counts * device.resolution_m)
 
-    def place_limit_m(self, point: Point) -> float:
-        """Largest distance from the balance that is in place [m]."""
-        return self._place_limit_m(point.device, balance(point.device, [point.wall]))
+    def place_limit_m(self, device: SimulationOptions, at: Balance) -> float:
+        """Largest distance from the balance that is in place, and the band of the settling time [m]."""
+        # Coulomb friction may hold the device beside the balance.
+        friction_m = coulomb_n(device) / at.springs_n_per_m if at.springs_n_per_m > 0.0 else 0.0
+        return max(self.place_share * abs(at.x_m), self.place_counts * device.resolution_m) + friction_m
 
     def outcome(self, device: SimulationOptions, at: Balance, span_m: float, mean_m: float) -> Outcome:
         """What became of a press that did not diverge.
@@ -95,42 +108,8 @@ class Criterion:
         """
         if not span_m <= self.still_limit_m(device):
             return Outcome.MOVING
-        placed = abs(mean_m - at.x_m) <= self._place_limit_m(device, at)
+        placed = abs(mean_m - at.x_m) <= self.place_limit_m(device, at)
         return Outcome.SETTLED if placed else Outcome.ELSEWHERE
-
-    def judge(self, points: Sequence[Point], result: BatchResult) -> np.ndarray[Any, Any]:
-        """The `Outcome` of each point.
-
-        Args:
-            points: the loops; each must have a balance.
-            result: what became of them, with a window of `window_s`.
-        """
-        ended = zip(points, result.finite, result.peak_to_peak_m, -result.mean_depth_m, strict=True)
-        return np.array(
-            [
-                self.outcome(point.device, balance(point.device, [point.wall]), span_m, mean_m)
-                if finite
-                else Outcome.DIVERGED
-                for point, finite, span_m, mean_m in ended
-            ],
-            dtype=int,
-        )
-
-    def _place_limit_m(self, device: SimulationOptions, at: Balance) -> float:
-        # Coulomb friction may hold the device beside the balance.
-        friction_m = coulomb_n(device) / at.springs_n_per_m if at.springs_n_per_m > 0.0 else 0.0
-        return max(self.place_share * abs(at.x_m), self.place_counts * device.resolution_m) + friction_m
-
-
-def misplaced_m(points: Sequence[Point], result: BatchResult) -> np.ndarray[Any, Any]:
-    """How much deeper than the balance each mean position is [m]."""
-    depth_m: np.ndarray[Any, Any] = result.mean_depth_m + np.array([balance_m(point) for point in points])
-    return depth_m
-
-
-def balance_m(point: Point) -> float:
-    """Where hand force and springs balance at the end, < 0 in the wall [m]; NaN where they do not."""
-    return balance(point.device, [point.wall]).x_m
 
 
 def balance(device: SimulationOptions, walls: Sequence[WallConfig]) -> Balance:

@@ -10,8 +10,9 @@ import pytest
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import WallConfig
-from hapticd.offline.run import play
-from hapticd.offline.verdict import Criterion, Outcome, balance, balance_m, misplaced_m
+from hapticd.offline.outcome import Criterion, Outcome, balance
+from hapticd.offline.presses import balance_m, judge, misplaced_m
+from hapticd.offline.simulate import simulate
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.options import SimulationOptions
 
@@ -29,7 +30,7 @@ def press(stiffness: float, newton: float, law: str = "none", **device: Any) -> 
 
 def outcome(stiffness: float, newton: float, law: str = "none", **device: Any) -> Outcome:
     point, result = press(stiffness, newton, law, **device)
-    (found,) = CRITERION.judge([point], result)
+    (found,) = judge(CRITERION, [point], result)
     return Outcome(found)
 
 
@@ -90,7 +91,7 @@ def test_a_second_wall_carries_its_part_only_where_it_is_reached() -> None:
         found = balance(loaded.options, loaded.config.scene.walls)
         assert found.x_m == pytest.approx(x_m)
         assert found.springs_n_per_m == springs
-        assert play(loaded, 2.0).mean_m == pytest.approx(x_m, abs=2e-5)
+        assert simulate(loaded, 2.0).mean_m == pytest.approx(x_m, abs=2e-5)
 
 
 @pytest.mark.parametrize(
@@ -105,11 +106,11 @@ def test_a_run_of_the_loop_and_a_point_of_a_batch_are_judged_alike(stiffness: fl
     """The last is held by friction a third of its depth beside the balance."""
     loaded = pressed(3.0, extra, f"[[scene.walls]]\nstiffness_n_per_m = {stiffness}")
     assert isinstance(loaded.options, SimulationOptions)
-    assert play(loaded, 4.0).verdict == words
+    assert simulate(loaded, 4.0).outcome.words == words
     law = plugins.law("none")
     point = Point(loaded.options, loaded.config.scene.walls[0], law.Params(), max_force_n=12.0)
     result = Batch(law, [point], 4.0, CRITERION.window_s, ledger=False).run_interpreted()
-    assert Outcome(CRITERION.judge([point], result)[0]).words == words
+    assert Outcome(judge(CRITERION, [point], result)[0]).words == words
 
 
 def test_stillness_is_never_finer_than_the_sensor() -> None:
