@@ -12,7 +12,8 @@ import typer
 
 from hapticd.config.loading import load
 from hapticd.errors import HapticdError
-from hapticd.offline.run import Row, ticks_in
+from hapticd.offline.rehearsal import ticks_in
+from hapticd.offline.run import Row
 from hapticd.offline.simulate import simulate as simulated
 from hapticd.offline.traces import open_trace
 from hapticd.progress import progress_bar

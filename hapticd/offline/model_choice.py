@@ -15,7 +15,7 @@ from typing import Any, Literal, cast
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.offline.operations import count_operations
-from hapticd.offline.run import rehearse
+from hapticd.offline.rehearsal import rehearse
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import Accuracy, Change, SimulationOptions
 from hapticd.simulation.plant import METHODS, terms

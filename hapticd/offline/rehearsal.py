@@ -6,16 +6,30 @@ advances by one period a tick whatever the host does.
 
 from __future__ import annotations
 
+import math
+from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.errors import ConfigError, DriverError
+from hapticd.offline.outcome import Criterion, balance
+from hapticd.offline.run import Row, Run, window_ticks
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.driver import FARTHEST_M, SimulatedDriver
 from hapticd.simulation.options import SimulationOptions
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.guard import Mode
+
+LONGEST_S = 1e9
+"""The longest run [s]."""
+
+_CHUNK_TICKS = 2000
+"""Ticks that are collected at once; progress is told as often."""
+
+_CODES = {"cycle": "q", "in_contact": "b"}
+"""Type codes of the columns that hold no floats."""
 
 MakeDevice = Callable[[SimulationOptions, float], SimulatedDevice]
 """Makes the model of a device, given its options and the period [s]."""
@@ -104,3 +118,122 @@ def simulation_options(loaded: LoadedConfig) -> SimulationOptions:
     if loaded.options.clock != "ticks":
         raise ConfigError(f'{loaded.path}: device.options.clock = "{loaded.options.clock}": must be "ticks" offline')
     return loaded.options
+
+
+def ticks_in(loaded: LoadedConfig, duration_s: float) -> int:
+    """How many ticks a time takes.
+
+    Raises:
+        ConfigError: the time makes no sense.
+    """
+    period_s = loaded.config.loop.period_s
+    if not period_s <= duration_s <= LONGEST_S:
+        raise ConfigError(
+            f"duration = {duration_s:g} s: must be at least one period, {period_s:g} s, and at most {LONGEST_S:g} s"
+        )
+    return round(duration_s / period_s)
+
+
+def rehearse(
+    loaded: LoadedConfig,
+    duration_s: float,
+    options: SimulationOptions | None = None,
+    make_device: MakeDevice | None = None,
+    take: Callable[[Row], object] | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Run:
+    """Run a configuration from the first tick to the last, or to where the model has diverged.
+
+    Args:
+        loaded: the configuration.
+        duration_s: simulated time [s].
+        options: of its device; None: the configuration's own.
+        make_device: makes the device model; None: the usual one.
+        take: is given every row as it comes; the run then keeps the last half second only.
+        progress: is told now and then how many ticks are done.
+
+    Raises:
+        ConfigError: the duration makes no sense, or the configuration is not one for a simulated device.
+        DriverError: the device cannot be stepped at this rate, or gave not even one sample.
+    """
+    ticks = ticks_in(loaded, duration_s)
+    rehearsal = Rehearsal(loaded, options, make_device)
+    device = rehearsal.model.options
+    at = balance(device, loaded.config.scene.walls)
+    keep = None if take is None else window_ticks(rehearsal.period_s)
+    collected = _Collected(at.x_m, Criterion().place_limit_m(device, at), keep)
+    chunk: list[Row] = []
+    for row in _rows(rehearsal, ticks, loaded.config.loop.period_ns):
+        chunk.append(row)
+        if take is not None:
+            take(row)
+        if len(chunk) == _CHUNK_TICKS:
+            collected.add(chunk)
+            chunk.clear()
+            if progress is not None:
+                progress(collected.ticks)
+    collected.add(chunk)
+    if not collected.ticks:
+        raise DriverError(rehearsal.fault or "the device gave no sample")
+    contacts = rehearsal.tick.contacts
+    return Run(
+        name=str(loaded.path),
+        config=loaded.config,
+        options=device,
+        columns=collected.columns,
+        ticks=collected.ticks,
+        left_place_tick=collected.left_place_tick,
+        peak_force_n=collected.peak_n,
+        stiffness_n_per_m=contacts[0].wall.stiffness_n_per_m if contacts else math.nan,
+        generated_j=sum([contact.ledger.generated_j for contact in contacts]),
+        dissipated_j=sum([contact.ledger.dissipated_j for contact in contacts]),
+        fault=rehearsal.fault,
+        diverged=rehearsal.diverged,
+    )
+
+
+def _rows(rehearsal: Rehearsal, ticks: int, period_ns: int) -> Iterator[Row]:
+    tick, model = rehearsal.tick, rehearsal.model
+    first = tick.contacts[0] if tick.contacts else None
+    axis = first.wall.axis if first else 0
+    outward = first.wall.outward if first else 1.0
+    ledgers = [contact.ledger for contact in tick.contacts]
+    for count in rehearsal.run(ticks):
+        yield Row(
+            count * period_ns / 1e9,
+            model.x_m,
+            model.v_m_per_s,
+            first.x_m if first else tick.motion.position_m[0],
+            outward * tick.force_n[axis],
+            outward * tick.requested_n[axis],
+            sum([ledger.energy_j for ledger in ledgers]),
+            first.ledger.cycle if first else 0,
+            first.damping_n_s_per_m if first else 0.0,
+            int(first.in_contact) if first else 0,
+        )
+
+
+class _Collected:
+    """Rows as columns, and what must be known of those that are not kept."""
+
+    def __init__(self, rest_m: float, band_m: float, keep: int | None) -> None:
+        self.columns: dict[str, array[Any]] = {name: array(_CODES.get(name, "d")) for name in Row._fields}
+        self.ticks = 0
+        self.left_place_tick = -1
+        self.peak_n = 0.0
+        self._rest_m = rest_m
+        self._band_m = band_m
+        self._keep = keep
+
+    def add(self, rows: list[Row]) -> None:
+        """Take rows in."""
+        for column, values in zip(self.columns.values(), zip(*rows, strict=True), strict=False):
+            column.extend(values)
+            if self._keep is not None:
+                del column[: -self._keep]
+        self.peak_n = max([self.peak_n, *(abs(row.force_n) for row in rows)])
+        for at in reversed(range(len(rows))):
+            if not abs(rows[at].x_m - self._rest_m) <= self._band_m:  # also where there is no place to rest
+                self.left_place_tick = self.ticks + at
+                break
+        self.ticks += len(rows)

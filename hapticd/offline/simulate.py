@@ -7,7 +7,8 @@ from pathlib import Path
 
 from hapticd.config.loading import LoadedConfig, load
 from hapticd.offline.model_choice import fitted
-from hapticd.offline.run import Row, Run, rehearse
+from hapticd.offline.rehearsal import rehearse
+from hapticd.offline.run import Row, Run
 
 
 def simulate(

@@ -14,7 +14,8 @@ from hapticd.config.loading import LoadedConfig, load
 from hapticd.errors import ConfigError, PluginError
 from hapticd.offline.column import Column
 from hapticd.offline.outcome import Criterion, Outcome
-from hapticd.offline.run import Run, ticks_in
+from hapticd.offline.rehearsal import ticks_in
+from hapticd.offline.run import Run
 from hapticd.offline.simulate import simulate
 
 FEW_TICKS = 400_000

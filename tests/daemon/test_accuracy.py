@@ -12,7 +12,7 @@ from hapticd.cli.watch.screen import frame
 from hapticd.cli.watch.state import ScreenState
 from hapticd.config.loading import load, parse
 from hapticd.loop.memory import RECORDS
-from hapticd.offline.run import rehearse
+from hapticd.offline.rehearsal import rehearse
 from hapticd.paths import directory
 from hapticd.simulation.options import SimulationOptions
 from hapticd.telemetry.records import Status

@@ -14,7 +14,7 @@ from hapticd.cli import main
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import ConfigError
 from hapticd.offline.model_choice import OMISSIONS, fit, fitted, omissions, without
-from hapticd.offline.run import rehearse
+from hapticd.offline.rehearsal import rehearse
 from hapticd.simulation.options import SimulationOptions
 from tests.examples import examples
 

@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 from hapticd.cli import main
 from hapticd.config.loading import load, parse
 from hapticd.offline.outcome import Criterion
-from hapticd.offline.run import Run, rehearse
+from hapticd.offline.rehearsal import rehearse
+from hapticd.offline.run import Run
 from hapticd.paths import directory
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions

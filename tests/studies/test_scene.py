@@ -15,7 +15,7 @@ import tomlkit
 from hapticd.cli import main
 from hapticd.config.loading import LoadedConfig, load, parse
 from hapticd.offline.outcome import Criterion
-from hapticd.offline.run import rehearse
+from hapticd.offline.rehearsal import rehearse
 from hapticd.paths import directory
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.scene.answers import answers

@@ -16,7 +16,8 @@ from hapticd.config.models import VelocityConfig
 from hapticd.errors import ConfigError
 from hapticd.offline import presses
 from hapticd.offline.outcome import Criterion, Outcome
-from hapticd.offline.run import Run, rehearse
+from hapticd.offline.rehearsal import rehearse
+from hapticd.offline.run import Run
 from hapticd.simulation.batch import Batch
 from hapticd.tick.velocity import make_estimator
 from hapticd_studies.accuracy.cost import StepCost, costs

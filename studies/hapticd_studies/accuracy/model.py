@@ -11,8 +11,8 @@ import numpy as np
 from hapticd.config.loading import LoadedConfig
 from hapticd.offline.model_choice import operations
 from hapticd.offline.outcome import pressing_n
-from hapticd.offline.rehearsal import simulation_options
-from hapticd.offline.run import Run, rehearse
+from hapticd.offline.rehearsal import rehearse, simulation_options
+from hapticd.offline.run import Run
 from hapticd_studies.accuracy.cost import StepCost, costs
 from hapticd_studies.accuracy.leak import Leak, leak
 from hapticd_studies.accuracy.settings import Setting, default_name, settings_of

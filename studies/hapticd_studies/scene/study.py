@@ -8,7 +8,8 @@ from itertools import combinations
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.errors import HapticdError
-from hapticd.offline.run import Run, rehearse
+from hapticd.offline.rehearsal import rehearse
+from hapticd.offline.run import Run
 from hapticd_studies.scene.answers import Answers, answers
 from hapticd_studies.scene.terms import Term, reduced, terms_of
 from hapticd_studies.scene.ticks import SETTLE_TICKS, tick_operations
