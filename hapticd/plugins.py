@@ -1,8 +1,9 @@
-"""Find drivers and laws by name: installed entry points, or for a law any importable module; imported when asked."""
+"""Find drivers and laws by name: installed entry points, or any importable module; imported when asked."""
 
 from __future__ import annotations
 
 import importlib
+import inspect
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any
@@ -21,18 +22,24 @@ def names(group: str) -> list[str]:
 
 
 def driver(name: str) -> type[Driver[Any]]:
-    """The driver class installed under a name.
+    """The driver class installed under a name, or one of an importable module.
+
+    Args:
+        name: an installed name; `package.module.Class`; or `package.module`, which holds one driver or says
+            `DRIVER = Class`.
 
     Raises:
-        PluginError: there is none, it cannot be imported, or it is not a `Driver`.
+        PluginError: there is none, it cannot be imported, or it is not a whole `Driver`.
     """
     point = _find(DRIVERS, name)
-    if point is None:
-        raise PluginError(f"no driver {name!r}: installed are {', '.join(names(DRIVERS)) or 'none'}")
-    loaded = _load(point)
-    if not (isinstance(loaded, type) and issubclass(loaded, Driver)):
-        raise PluginError(f"driver {name}: {point.value} is not a hapticd.driver.Driver")
-    return loaded
+    if point is not None:
+        return _checked_driver(name, point.value, _load(point))
+    if "." in name:
+        return _driver_of_module(name)
+    raise PluginError(
+        f"no driver {name!r}: installed are {', '.join(names(DRIVERS)) or 'none'}; one of your own is named with a "
+        "dot, `package.module`"
+    )
 
 
 def law(name: str) -> ModuleType:
@@ -45,10 +52,7 @@ def law(name: str) -> ModuleType:
     if point is not None:
         loaded = _load(point)
     elif "." in name:
-        try:
-            loaded = importlib.import_module(name)
-        except (Exception, SystemExit) as error:
-            raise PluginError(f"law module {name!r} cannot be imported: {type(error).__name__}: {error}") from error
+        loaded = _imported("law", name, name)
     else:
         raise PluginError(
             f"no law {name!r}: installed are {', '.join(names(CONTROLLERS)) or 'none'}; a module of your own is named "
@@ -58,6 +62,71 @@ def law(name: str) -> ModuleType:
         raise PluginError(f"law {name}: {loaded!r} is not a module")
     check_law(loaded)
     return loaded
+
+
+def _driver_of_module(name: str) -> type[Driver[Any]]:
+    """The driver of `package.module` or `package.module.Class`."""
+    try:
+        module = _imported("driver", name, name)
+    except PluginError as error:
+        if not (isinstance(error.__cause__, ModuleNotFoundError) and error.__cause__.name == name):
+            raise
+        owner, _, last = name.rpartition(".")
+        module = _imported("driver", name, owner)
+        if hasattr(module, last):
+            return _checked_driver(name, name, getattr(module, last))
+        raise PluginError(
+            f"driver {name!r}: there is no module {name}, and {owner} has no class {last}; {_held(module)}"
+        ) from None
+    if hasattr(module, "DRIVER"):
+        return _checked_driver(name, f"{name}.DRIVER", module.DRIVER)
+    found = _drivers_in(module)
+    if len(found) != 1:
+        raise PluginError(
+            f"driver {name!r}: {_held(module)}; name the class, `{name}.Class`, or say `DRIVER = Class` in the module"
+        )
+    return _checked_driver(name, f"{name}.{found[0].__name__}", found[0])
+
+
+def _drivers_in(module: ModuleType) -> list[type[Driver[Any]]]:
+    """The drivers that a module defines, without those that it imports."""
+    return [
+        each
+        for each in vars(module).values()
+        if isinstance(each, type) and issubclass(each, Driver) and each.__module__ == module.__name__
+    ]
+
+
+def _held(module: ModuleType) -> str:
+    """What drivers a module defines, in words."""
+    defined = ", ".join(each.__name__ for each in _drivers_in(module))
+    return f"{module.__name__} defines {defined or 'no subclass of hapticd.driver.Driver'}"
+
+
+def _checked_driver(name: str, place: str, loaded: object) -> type[Driver[Any]]:
+    """What was found under a name, if it is a driver with every hook.
+
+    Raises:
+        PluginError: it is not.
+    """
+    if not (isinstance(loaded, type) and issubclass(loaded, Driver)):
+        raise PluginError(f"driver {name}: {place} is not a hapticd.driver.Driver")
+    if inspect.isabstract(loaded):
+        lacking = ", ".join(sorted(loaded.__abstractmethods__))
+        raise PluginError(f"driver {name}: {place} lacks {lacking}: see docs/drivers.md")
+    return loaded
+
+
+def _imported(kind: str, name: str, module: str) -> ModuleType:
+    """A module, for a plug-in that is named by it.
+
+    Raises:
+        PluginError: it cannot be imported; caused by what went wrong.
+    """
+    try:
+        return importlib.import_module(module)
+    except (Exception, SystemExit) as error:
+        raise PluginError(f"{kind} module {name!r} cannot be imported: {type(error).__name__}: {error}") from error
 
 
 def _find(group: str, name: str) -> EntryPoint | None:

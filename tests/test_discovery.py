@@ -11,7 +11,7 @@ from hapticd import discovery, plugins
 from hapticd.device import Diagnosis, FoundDevice
 from hapticd.discovery import Discovery
 from hapticd.simulation.options import SimulationOptions
-from tests.drivers.plugin import install
+from tests.drivers.plugin import install, write_module
 
 look = partial(discovery.look, timeout_s=300.0)  # on a computer with other work
 
@@ -95,3 +95,9 @@ def test_every_built_in_driver_answers(name: str) -> None:
     (looked,) = look({name: None})
     assert looked.problem == ""
     assert looked.absent
+
+
+def test_a_driver_that_is_named_by_its_module_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_module(tmp_path, monkeypatch, "find(cls, options=None): return []")
+    for name in ("mylab.rig", "mylab.rig.Driver"):
+        assert look({name: None}) == [Discovery(name, absent="plug it in")]

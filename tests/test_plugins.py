@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from types import ModuleType
@@ -23,14 +24,22 @@ def step(state, params, tick): return tick.contact_n
 """
 
 
+GOOD_DRIVER = """
+from hapticd.driver import Driver
+from hapticd_drivers.loopback import Loopback
+class MyRig(Loopback):
+    pass
+"""
+
+
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A package of the user's own, `lab`."""
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab" / "__init__.py").write_text("")
     monkeypatch.syspath_prepend(tmp_path)
-    for name in ("lab", "lab.law"):
-        monkeypatch.delitem(__import__("sys").modules, name, raising=False)
+    for name in ("lab", "lab.law", "lab.rig"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     return tmp_path / "lab"
 
 
@@ -59,7 +68,7 @@ def test_every_shipped_law_keeps_the_contract_and_every_driver_loads() -> None:
 
 
 def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:
-    with pytest.raises(PluginError, match=r"no driver 'omega9': installed are .*loopback"):
+    with pytest.raises(PluginError, match=r"no driver 'omega9': installed are .*loopback.*package\.module"):
         plugins.driver("omega9")
     with pytest.raises(PluginError, match=r"no law 'magic': installed are .*energy-cycle.*package\.module"):
         plugins.law("magic")
@@ -90,6 +99,60 @@ def test_a_module_that_is_no_law_is_refused_with_what_it_lacks(elsewhere: Path, 
     (elsewhere / "law.py").write_text(source)
     with pytest.raises(PluginError, match=said):
         plugins.law("lab.law")
+
+
+@pytest.mark.parametrize("name", ["lab.rig", "lab.rig.MyRig"])
+def test_a_driver_of_ones_own_is_named_by_its_module_or_its_class(elsewhere: Path, name: str) -> None:
+    """What the module imports from elsewhere, `Driver` and `Loopback` here, is not its own."""
+    (elsewhere / "rig.py").write_text(GOOD_DRIVER)
+    found = plugins.driver(name)
+    assert (found.__module__, found.__name__) == ("lab.rig", "MyRig")
+
+
+def test_a_module_of_several_drivers_says_which_one_is_meant(elsewhere: Path) -> None:
+    (elsewhere / "rig.py").write_text(GOOD_DRIVER + "class Other(Loopback): pass\n")
+    with pytest.raises(PluginError) as refused:
+        plugins.driver("lab.rig")
+    assert str(refused.value) == (
+        "driver 'lab.rig': lab.rig defines MyRig, Other; name the class, `lab.rig.Class`, or say `DRIVER = Class` in "
+        "the module"
+    )
+    assert plugins.driver("lab.rig.Other").__name__ == "Other"
+    (elsewhere / "rig.py").write_text(GOOD_DRIVER + "class Other(Loopback): pass\nDRIVER = Other\n")
+    del sys.modules["lab.rig"]
+    assert plugins.driver("lab.rig").__name__ == "Other"
+
+
+def test_a_module_may_name_a_driver_that_it_imports(elsewhere: Path) -> None:
+    (elsewhere / "rig.py").write_text("from hapticd_drivers.loopback import Loopback\nDRIVER = Loopback\n")
+    assert plugins.driver("lab.rig").__name__ == "Loopback"
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "said"),
+    [
+        ("lab.missing", "", "there is no module lab.missing, and lab has no class missing"),
+        ("lab.rig.MyRigg", GOOD_DRIVER, "lab.rig has no class MyRigg; lab.rig defines MyRig"),
+        ("nowhere.rig", "", "driver module 'nowhere.rig' cannot be imported: ModuleNotFoundError"),
+        ("lab.nowhere.MyRig", "", "No module named 'lab.nowhere'"),
+        ("lab.rig", "import no_such_library", "No module named 'no_such_library'"),
+        ("lab.rig.MyRig", "import no_such_library", "No module named 'no_such_library'"),
+        ("lab.rig", "1 / 0", "cannot be imported: ZeroDivisionError"),
+        ("lab.rig", "x = 1", "lab.rig defines no subclass of hapticd.driver.Driver"),
+        ("lab.rig", "DRIVER = 1", "lab.rig.DRIVER is not a hapticd.driver.Driver"),
+        ("lab.rig.x", "x = 1", "lab.rig.x is not a hapticd.driver.Driver"),
+        (
+            "lab.rig",
+            "from hapticd.driver import Driver\nclass Half(Driver):\n  def _open(self): ...\n  def _close(self): ...",
+            "lab.rig.Half lacks _disable, _enable, _read, _write: see docs/drivers.md",
+        ),
+    ],
+)
+def test_a_name_that_leads_to_no_driver_says_what_is_there(elsewhere: Path, name: str, source: str, said: str) -> None:
+    (elsewhere / "rig.py").write_text(source)
+    with pytest.raises(PluginError) as refused:
+        plugins.driver(name)
+    assert said in str(refused.value)
 
 
 def test_an_installed_name_that_is_no_driver_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,7 +33,9 @@ Details = tuple[str, Sequence[str]]
 
 
 def devices(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Only this driver, with its options.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="Only this driver, also `package.module`, with its options.")
+    ] = None,
     config: Annotated[
         Path | None,
         typer.Option(
@@ -45,7 +47,7 @@ def devices(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array, an object a driver.")] = False,
 ) -> None:
-    """List the devices that the installed drivers find.
+    """List the devices that the installed drivers, and the one that the configuration names, find.
 
     One that cannot be used is listed with the reason and with what mends it. No device is moved; some have to be
     opened for a moment, so one that the daemon has shows as held. With NAME, the options of that driver follow.
@@ -54,6 +56,8 @@ def devices(
     """
     drivers = describe_plugins(plugins.DRIVERS, name, plugins.driver, lambda driver: driver.Options)
     configured, options = _configured(config)
+    if name is None and configured not in ("", *plugins.names(plugins.DRIVERS)):  # it is named by its module
+        drivers += describe_plugins(plugins.DRIVERS, configured, plugins.driver, lambda driver: driver.Options)
     wanted = {plugin.name: options if plugin.name == configured else None for plugin in drivers if not plugin.problem}
     looked = {one.driver: one for one in discovery.look(wanted)}
     if as_json:

@@ -182,13 +182,12 @@ def _plugin(
     if not isinstance(name, str) or not name:  # already reported
         return None
     installed = plugins.names(group)
-    own_module = group == plugins.CONTROLLERS and "." in name
-    if name not in installed and not own_module:
-        own = "; a module of your own is named package.module" if group == plugins.CONTROLLERS else ""
-        problems.add(key, f"not installed{own}; {nearest(name, installed)}", name)
+    if name not in installed and "." not in name:
+        own = "a module of your own is named package.module"
+        problems.add(key, f"not installed; {own}; {nearest(name, installed)}", name)
         return None
-    if own_module and not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)+", name):
-        problems.add(key, "must be the dotted name of a Python module, such as mylab.laws", name)
+    if name not in installed and not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)+", name):
+        problems.add(key, f"must be the dotted name of a Python module, such as mylab.{key[1]}s", name)
         return None
     try:
         return find(name)

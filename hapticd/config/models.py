@@ -57,7 +57,9 @@ class LoopConfig(Table):
 class DeviceConfig(Table):
     """[device]: which driver, and its own options."""
 
-    driver: str = Field("loopback", min_length=1, description="installed driver, see `hapticd devices`")
+    driver: str = Field(
+        "loopback", min_length=1, description="installed driver or importable module, see `hapticd devices`"
+    )
     options: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
     accept_no_watchdog: bool = Field(
         False,

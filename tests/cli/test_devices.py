@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tests.drivers.plugin import install
+from tests.drivers.plugin import install, write_module
 
 HAPTICD = str(Path(sys.executable).with_name("hapticd"))
 
@@ -97,3 +97,17 @@ def test_a_configuration_that_cannot_be_used_is_refused_when_it_was_asked_for(tm
     done = hapticd("devices", "--config", config)
     assert (done.returncode, done.stdout) == (2, "")
     assert f"hapticd: {config}: loop.rate_hz" in done.stderr
+
+
+def test_a_driver_that_is_named_by_its_module_is_listed_when_it_is_configured_or_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_module(
+        tmp_path, monkeypatch, "find(cls, options=None): return [FoundDevice(repr(options and options.seed), '')]"
+    )
+    config = tmp_path / "lab.toml"
+    config.write_text('[device]\ndriver = "mylab.rig"\n[device.options]\nseed = 42\n')
+    assert listed("--config", config)["mylab.rig"]["devices"][0]["model"] == "42"
+    assert "mylab.rig" not in listed()
+    assert listed("mylab.rig")["mylab.rig"]["devices"][0]["model"] == "None"
+    assert hapticd("devices", "mylab.nothing").returncode == 2

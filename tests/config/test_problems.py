@@ -74,7 +74,26 @@ EXAMPLES = {
         'control.tcp = "tcp://lab:9873": must be an address and a port, such as tcp://127.0.0.1:9873'
     ),
     # plug-ins
-    "[device]\ndriver = 'lopback'": 'device.driver = "lopback": not installed; did you mean "loopback"?',
+    "[device]\ndriver = 'lopback'": (
+        'device.driver = "lopback": not installed; a module of your own is named package.module; '
+        'did you mean "loopback"?'
+    ),
+    "[device]\ndriver = 'mylab/rig.py'": (
+        'device.driver = "mylab/rig.py": must be the dotted name of a Python module, such as mylab.drivers'
+    ),
+    "[device]\ndriver = 'mylab.rig'": (
+        "device.driver = \"mylab.rig\": driver module 'mylab.rig' cannot be imported: ModuleNotFoundError: "
+        "No module named 'mylab'; install its package where hapticd is installed, or put its directory on PYTHONPATH "
+        "(the configuration's directory is not searched)"
+    ),
+    "[device]\ndriver = 'json.decoder'": (
+        "device.driver = \"json.decoder\": driver 'json.decoder': json.decoder defines no subclass of "
+        "hapticd.driver.Driver; name the class, `json.decoder.Class`, or say `DRIVER = Class` in the module"
+    ),
+    "[device]\ndriver = 'json.decodre'": (
+        "device.driver = \"json.decodre\": driver 'json.decodre': there is no module json.decodre, and json has no "
+        "class decodre; json defines no subclass of hapticd.driver.Driver"
+    ),
     "[controller]\nlaw = 'energycycle'": (
         'controller.law = "energycycle": not installed; a module of your own is named package.module; '
         'did you mean "energy-cycle"?'

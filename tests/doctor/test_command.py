@@ -21,6 +21,7 @@ from hapticd.doctor.examination import Examination, verdict
 from hapticd.doctor.finding import Finding, Mark
 from hapticd.paths import directory
 from tests.daemon.running import Daemon
+from tests.drivers.plugin import write_module
 
 HAPTICD = str(Path(sys.executable).with_name("hapticd"))
 GOOD = str(directory("config") / "hapticd.toml")
@@ -179,6 +180,18 @@ def test_a_device_is_looked_for_where_its_options_say(tmp_path: Path, empty: dic
     report = reported(doctor("--config", str(path), "--no-latency", "--json", **empty))
     found = marked(report, "driver.devices")
     assert (found["mark"], str(port) in found["text"]) == ("ok", True)
+
+
+@pytest.mark.parametrize(("find", "mark"), [("return []", "problem"), ("return [FoundDevice('rig', '7')]", "ok")])
+def test_a_driver_that_is_named_by_its_module_is_asked_like_any_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, empty: dict[str, str], find: str, mark: str
+) -> None:
+    write_module(tmp_path, monkeypatch, f"find(cls, options=None): {find}")
+    path = tmp_path / "lab.toml"
+    path.write_text('[device]\ndriver = "mylab.rig"\n')
+    report = reported(doctor("--config", str(path), "--no-latency", "--json", **empty))
+    assert marked(report, "configuration.usable")["mark"] == "ok"
+    assert marked(report, "driver.devices")["mark"] == mark
 
 
 def test_a_running_daemon_is_seen_and_not_delayed() -> None:

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+
+
+def write_module(directory: Path, monkeypatch: pytest.MonkeyPatch, *methods: str) -> None:
+    """Write `mylab.rig`, which no package installs, and let child processes import it."""
+    (directory / "mylab").mkdir()
+    (directory / "mylab" / "rig.py").write_text(_source(methods))
+    monkeypatch.setenv("PYTHONPATH", str(directory))
 
 
 def install(directory: Path, monkeypatch: pytest.MonkeyPatch, *methods: str, name: str = "odd") -> None:
@@ -14,6 +22,11 @@ def install(directory: Path, monkeypatch: pytest.MonkeyPatch, *methods: str, nam
     information.mkdir(parents=True)
     (information / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1\n")
     (information / "entry_points.txt").write_text(f"[hapticd.drivers]\n{name} = {module}:Driver\n")
+    (directory / f"{module}.py").write_text(_source(methods))
+    monkeypatch.setenv("PYTHONPATH", str(directory))
+
+
+def _source(methods: Sequence[str]) -> str:
     lines = [
         "import ctypes, os, time",
         "from hapticd.device import Diagnosis",
@@ -24,5 +37,4 @@ def install(directory: Path, monkeypatch: pytest.MonkeyPatch, *methods: str, nam
         "    '''Somebody's own.'''",
         *(line for method in methods for line in ("    @classmethod", f"    def {method}")),
     ]
-    (directory / f"{module}.py").write_text("\n".join(lines) + "\n")
-    monkeypatch.setenv("PYTHONPATH", str(directory))
+    return "\n".join(lines) + "\n"
