@@ -69,6 +69,9 @@ class Sample:
         self.orientation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
         self.calibrated = True
 
+    def __repr__(self) -> str:
+        return f"Sample({', '.join(f'{name}={getattr(self, name)!r}' for name in self.__slots__)})"
+
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
@@ -119,7 +122,7 @@ class FoundDevice:
     Attributes:
         model: what it is.
         serial: its serial number; "" when it has none or could not be asked.
-        where: where it is plugged in, for people; "" when nobody tells.
+        where: where it is plugged in, for people; "" when that is not known.
         problem: why it cannot be used now; "" when it can.
         note: what is to be known before it is used; "" when there is nothing.
         mend: lines for a shell that end the problem, as they stand; one that no command can mend is a comment, `# ...`.

@@ -13,11 +13,26 @@ import enum
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, Generic, TypeVar
+from types import TracebackType
+from typing import ClassVar, Generic, Self, TypeVar
+
+from pydantic import Field
 
 from hapticd.device import MOST_METRICS, DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
 from hapticd.errors import DriverError, DriverStateError
 from hapticd.settings import Table
+
+__all__ = [
+    "DeviceInfo",
+    "Diagnosis",
+    "Driver",
+    "DriverOptions",
+    "DriverState",
+    "Field",
+    "FoundDevice",
+    "Metric",
+    "Sample",
+]
 
 
 class DriverOptions(Table):
@@ -40,6 +55,11 @@ _CLOSED, _ENABLED = DriverState.CLOSED, DriverState.ENABLED  # Python 3.11 takes
 
 class Driver(ABC, Generic[OptionsT]):
     """A device behind a driver.
+
+    As a context manager it opens the device and, whatever happens inside, closes it without force:
+
+        with SerialRig(options, period_s=0.001) as rig:
+            rig.enable()
 
     Args:
         options: the device's options, an instance of `Options`.
@@ -67,6 +87,13 @@ class Driver(ABC, Generic[OptionsT]):
         self._axes = 0
         self._calibrating = False
         self._called_off = False
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
 
     @classmethod
     def check(cls, options: OptionsT, period_s: float) -> None:

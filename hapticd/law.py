@@ -24,8 +24,23 @@ import typing
 from types import ModuleType
 from typing import Any, Literal
 
+from pydantic import Field
+
 from hapticd.errors import PluginError
 from hapticd.settings import Table
+
+__all__ = [
+    "Field",
+    "LawParams",
+    "LawSnapshot",
+    "LawTick",
+    "Scalar",
+    "check_law",
+    "fresh_state",
+    "plain_object",
+    "scalar_params",
+    "state_fields",
+]
 
 Scalar = float | int | bool
 
@@ -34,8 +49,17 @@ class LawParams(Table):
     """Base of every law's parameters: strict, frozen, finite, no unknown keys."""
 
 
+def _shown(slotted: Any) -> str:
+    """The fields of a slotted object, as the call that makes an equal one."""
+    kind = type(slotted)
+    return f"{kind.__name__}({', '.join(f'{name}={getattr(slotted, name)!r}' for name in kind.__slots__)})"
+
+
 class LawTick:
     """What a law sees of one contact at one tick.
+
+    The loop makes one a contact and fills it anew at each tick; a test of a law makes its own:
+    `LawTick(x_m=-1e-3, in_contact=True, contact_n=12.0)`.
 
     Every number is finite and within bounds that the tick keeps, so that a law need not look: |x| and |moved| below
     1e8 m, |velocity| below 1e6 m/s, dt from 1e-9 to 1 s, forces below 1e18 N.
@@ -66,17 +90,32 @@ class LawTick:
         "x_m",
     )
 
-    def __init__(self, resolution_m: float = 0.0) -> None:
-        self.x_m = 0.0
-        self.moved_m = 0.0
-        self.velocity_m_per_s = 0.0
-        self.dt_s = 0.0
-        self.in_contact = False
-        self.contact_n = 0.0
-        self.spring_n = 0.0
-        self.applied_n = 0.0
-        self.applied_contact_n = 0.0
+    def __init__(
+        self,
+        resolution_m: float = 0.0,
+        *,
+        x_m: float = 0.0,
+        moved_m: float = 0.0,
+        velocity_m_per_s: float = 0.0,
+        dt_s: float = 1e-3,
+        in_contact: bool = False,
+        contact_n: float = 0.0,
+        spring_n: float = 0.0,
+        applied_n: float = 0.0,
+        applied_contact_n: float = 0.0,
+    ) -> None:
+        self.x_m = x_m
+        self.moved_m = moved_m
+        self.velocity_m_per_s = velocity_m_per_s
+        self.dt_s = dt_s
+        self.in_contact = in_contact
+        self.contact_n = contact_n
+        self.spring_n = spring_n
+        self.applied_n = applied_n
+        self.applied_contact_n = applied_contact_n
         self.resolution_m = resolution_m
+
+    __repr__ = _shown
 
 
 class LawSnapshot:
@@ -86,7 +125,7 @@ class LawSnapshot:
         x_m: position relative to the wall [m], < 0 inside.
         velocity_m_per_s: estimated velocity along the wall's normal [m/s].
         applied_n: force applied by this contact in the last tick [N].
-        debt_j: energy that this contact has generated and nobody has dissipated yet [J], >= 0; a credit is not carried.
+        debt_j: energy that this contact has generated and not yet dissipated [J], >= 0; a credit is not carried.
         damping_n_s_per_m: damping that the law before had reached [N s/m]; 0 when unknown.
     """
 
@@ -105,6 +144,8 @@ class LawSnapshot:
         self.applied_n = applied_n
         self.debt_j = debt_j
         self.damping_n_s_per_m = damping_n_s_per_m
+
+    __repr__ = _shown
 
 
 @functools.cache
@@ -147,7 +188,7 @@ def scalar_params(params: LawParams) -> dict[str, Scalar]:
 
 @functools.cache
 def _plain_class(name: str, fields: tuple[str, ...]) -> type[Any]:
-    return type(name, (), {"__slots__": fields})
+    return type(name, (), {"__slots__": fields, "__repr__": _shown})
 
 
 def plain_object(name: str, fields: dict[str, Scalar]) -> Any:
