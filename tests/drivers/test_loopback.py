@@ -11,8 +11,8 @@ import pytest
 from hapticd.errors import DeviceFaultError, DeviceProtocolError
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
+from hapticd.testing.driver_contract import AnyDriver, DriverContract
 from hapticd_drivers.loopback import Loopback
-from tests.drivers.contract import AnyDriver, DriverContract
 
 T = 1e-3
 ROUGH = {

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import pytest
 
+from hapticd.testing.driver_contract import AnyDriver, DriverContract
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from hapticd_drivers.forcedimension.models import MODELS
-from tests.drivers.contract import AnyDriver, DriverContract
 from tests.drivers.forcedimension.bench import Bench
 
 

@@ -20,11 +20,11 @@ from hapticd.errors import (
     DeviceTimeoutError,
     DriverStateError,
 )
+from hapticd.testing.driver_contract import AnyDriver, DriverContract
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.hid_rig import HidRig
 from hapticd_drivers.rig.metrics import DAMAGED, UNSENT
 from tests.daemon.running import wait_until
-from tests.drivers.contract import AnyDriver, DriverContract
 from tests.drivers.rig.hid_bench import HAS_HOME_SWITCH, SERIAL, HidDouble, build
 
 STALLED_TICKS = 50

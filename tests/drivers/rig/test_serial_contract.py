@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import pytest
 
+from hapticd.testing.driver_contract import AnyDriver, DriverContract
 from hapticd_drivers.rig.serial_rig import SerialRig, SerialRigOptions
-from tests.drivers.contract import AnyDriver, DriverContract
 from tests.drivers.rig.device import Rig
 
 

@@ -17,16 +17,22 @@ AnyDriver = Driver[Any]
 
 
 class DriverContract:
-    """Subclass as `TestYourDriver(DriverContract)` and provide the fixture `driver` and `force_on_device`."""
+    """Subclass as `TestYourDriver(DriverContract)`; provide the fixture `driver` and the method `force_on_device`.
+
+    class TestMyRig(DriverContract):
+        @pytest.fixture
+        def driver(self): ...                        # a closed driver whose device, or its double, is there
+        def force_on_device(self, driver): ...       # what the device says it is pushed with
+    """
 
     @pytest.fixture
     def driver(self) -> AnyDriver:
-        """A closed driver whose device, or its double, is there."""
-        raise NotImplementedError
+        """A closed driver whose device, or its double, is there; a new one for each test."""
+        raise NotImplementedError("give the test class a fixture `driver`: a closed driver whose device is there")
 
-    def force_on_device(self, driver: AnyDriver) -> Sequence[float]:
+    def force_on_device(self, driver: Any) -> Sequence[float]:
         """What the device, and not the driver, says it is being pushed with now [N]; asked while the driver is open."""
-        raise NotImplementedError
+        raise NotImplementedError("give the test class a method `force_on_device`: what the device is pushed with [N]")
 
     @pytest.fixture
     def enabled(self, driver: AnyDriver) -> AnyDriver:
@@ -210,3 +216,23 @@ class DriverContract:
             enabled.calibrate()
         assert enabled.state is DriverState.ENABLED
         enabled.close()
+
+    def test_a_with_block_opens_the_device_and_gives_it_back_without_force(self, driver: AnyDriver) -> None:
+        """Also when the block fails while the device pushes."""
+        with pytest.raises(ZeroDivisionError):
+            self._fail_inside(driver)
+        assert driver.state is DriverState.CLOSED
+        with driver:
+            driver.read()
+            assert not any(self.force_on_device(driver))
+        assert driver.state is DriverState.CLOSED
+
+    def _fail_inside(self, driver: AnyDriver) -> None:
+        """Leave a `with` block by an error while the device pushes."""
+        with driver as opened:
+            assert opened is driver
+            assert driver.state is DriverState.OPEN
+            driver.enable()
+            driver.read()
+            driver.write(self.a_force(driver))
+            raise ZeroDivisionError
