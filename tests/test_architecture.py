@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -80,18 +79,6 @@ def test_a_skipped_test_is_a_failure_in_ci_only(tmp_path: Path, ci: str, status:
     done = run(sys.executable, "-m", "pytest", "-rA", tmp_path, cwd=tmp_path, CI=ci, PYTHONPATH=str(ROOT))
     assert (done.returncode != 0) == bool(status), done.stdout
     assert done.stdout.count("skipped in CI") >= 2 * status
-
-
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, unpacked as an installer would do it."""
-    folder = tmp_path_factory.mktemp("wheel")
-    done = run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder)
-    assert done.returncode == 0, done.stderr
-    (wheel,) = folder.glob("*.whl")
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(folder / "site-packages")
-    return folder / "site-packages"
 
 
 def test_the_wheel_holds_five_packages_and_nothing_called_drivers(installed: Path) -> None:

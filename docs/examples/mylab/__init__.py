@@ -1,0 +1,1 @@
+"""Templates of a law and a driver of your own; copy this folder, rename it, and run `pytest` beside it."""
