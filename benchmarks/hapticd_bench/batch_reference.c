@@ -276,6 +276,7 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
                 return;
             }
             double velocity = (x - loop->last_m) / params->dt_s;
+            loop->velocity_m_per_s = velocity;
             loop->last_m = x;
             if (!(-1e6 < velocity && velocity < 1e6)) {
                 loop->finite = false;
@@ -293,6 +294,8 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
             }
             tick->contact_n = tick->spring_n;
             double force = law_step(state, law, tick);
+            loop->damping_n_s_per_m = state->damping_n_s_per_m;
+            loop->felt_mass_kg = state->felt_mass_kg;
             if (!tick->in_contact) force = 0.0;
             if (!(-MOST < force && force < MOST)) {
                 loop->finite = false;
@@ -300,8 +303,6 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
             }
             double share = 1.0;
             if (force > params->limit_n || force < -params->limit_n) share = params->limit_n / fabs(force);
-            loop->damping_n_s_per_m = state->damping_n_s_per_m;
-            loop->felt_mass_kg = state->felt_mass_kg;
             tick->applied_n = share * force;
             tick->applied_contact_n = share * tick->contact_n;
             loop->force_n = tick->applied_n;

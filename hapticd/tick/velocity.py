@@ -1,12 +1,13 @@
 """Velocity from sampled positions.
 
-Every estimator has the same two calls: `start` at a position at rest, `update` once a tick.
+Every estimator has the same two calls: `start` at a position at rest, `update` once a tick. `Difference.update` and
+`push` are the batch kernel's too.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
 from hapticd.config.models import VelocityConfig
 
@@ -45,78 +46,82 @@ def make_estimator(config: VelocityConfig, resolution_m: float) -> Estimator:
 class Difference:
     """v(n) = (x(n) - x(n-1)) / T: no lag beyond half a sample, all of the quantisation noise."""
 
-    __slots__ = ("_position_m", "_velocity_m_per_s")
+    __slots__ = ("last_m", "velocity_m_per_s")
 
     def start(self, position_m: float) -> None:
         """Forget the past."""
-        self._position_m = position_m
-        self._velocity_m_per_s = 0.0
+        self.last_m = position_m
+        self.velocity_m_per_s = 0.0
 
     def update(self, position_m: float, dt_s: float, device_m_per_s: float) -> float:
         """Velocity now [m/s]; the last one while time stands still."""
         if dt_s > 0.0:
-            self._velocity_m_per_s = (position_m - self._position_m) / dt_s
-            self._position_m = position_m
-        return self._velocity_m_per_s
+            self.velocity_m_per_s = (position_m - self.last_m) / dt_s
+            self.last_m = position_m
+        return self.velocity_m_per_s
+
+
+def push(ring: Any, position_m: Any, time_s: Any, now_m: float, dt_s: float) -> None:
+    """Enter a position into a history of the last ones.
+
+    Args:
+        ring: an object with the integers `size`, of the longest history, `newest`, the index of the last entry, and
+            `filled`, how many there are.
+        position_m: the entries [m].
+        time_s: when each was taken; all of them may move together [s].
+        now_m: the new position [m].
+        dt_s: time since the last one [s].
+    """
+    newest = ring.newest
+    last_s = time_s[newest]
+    if last_s > 10.0:  # keep the times small, so that their differences stay exact over days
+        for at in range(ring.size):
+            time_s[at] -= last_s
+        last_s = 0.0
+    ring.newest = newest = (newest + 1) % ring.size
+    position_m[newest] = now_m
+    time_s[newest] = last_s + dt_s
+    if ring.filled < ring.size:
+        ring.filled += 1
 
 
 class _History:
-    """The last positions and the time each was taken, newest at `newest`."""
+    """Base of those that remember the last positions and the time each was taken."""
 
-    __slots__ = ("filled", "newest", "position_m", "size", "time_s")
+    __slots__ = ("filled", "newest", "position_m", "size", "time_s", "velocity_m_per_s")
 
-    def __init__(self, size: int) -> None:
-        self.size = size
-        self.position_m = [0.0] * size
-        self.time_s = [0.0] * size
-        self.newest = 0
-        self.filled = 0
+    def __init__(self, samples: int) -> None:
+        self.size = samples + 1
+        self.position_m = [0.0] * self.size
+        self.time_s = [0.0] * self.size
 
     def start(self, position_m: float) -> None:
+        """Forget the past."""
         self.newest = 0
         self.filled = 1
         self.position_m[0] = position_m
         self.time_s[0] = 0.0
-
-    def push(self, position_m: float, dt_s: float) -> None:
-        last_s = self.time_s[self.newest]
-        if last_s > 10.0:  # keep the times small, so that their differences stay exact over days
-            for at in range(self.size):
-                self.time_s[at] -= last_s
-            last_s = 0.0
-        self.newest = (self.newest + 1) % self.size
-        self.position_m[self.newest] = position_m
-        self.time_s[self.newest] = last_s + dt_s
-        if self.filled < self.size:
-            self.filled += 1
+        self.velocity_m_per_s = 0.0
 
 
-class LongDifference:
+class LongDifference(_History):
     """v(n) = (x(n) - x(n-N)) / (t(n) - t(n-N)): quieter than one sample, late by N/2 samples.
 
     Args:
         samples: N.
     """
 
-    __slots__ = ("_history", "_velocity_m_per_s")
-
-    def __init__(self, samples: int) -> None:
-        self._history = _History(samples + 1)
-
-    def start(self, position_m: float) -> None:
-        """Forget the past."""
-        self._history.start(position_m)
-        self._velocity_m_per_s = 0.0
+    __slots__ = ()
 
     def update(self, position_m: float, dt_s: float, device_m_per_s: float) -> float:
-        """Velocity now [m/s], over fewer samples until N have come."""
+        """Velocity now [m/s], over fewer samples until N have come; the last one while time stands still."""
         if dt_s > 0.0:
-            history = self._history
-            history.push(position_m, dt_s)
-            oldest = (history.newest + 1 - history.filled) % history.size
-            span_s = history.time_s[history.newest] - history.time_s[oldest]
-            self._velocity_m_per_s = (position_m - history.position_m[oldest]) / span_s
-        return self._velocity_m_per_s
+            time_s = self.time_s
+            push(self, self.position_m, time_s, position_m, dt_s)
+            newest = self.newest
+            oldest = (newest + 1 - self.filled) % self.size
+            self.velocity_m_per_s = (position_m - self.position_m[oldest]) / (time_s[newest] - time_s[oldest])
+        return self.velocity_m_per_s
 
 
 class LowPass:
@@ -150,7 +155,7 @@ class LowPass:
         return self._velocity_m_per_s
 
 
-class AdaptiveWindow:
+class AdaptiveWindow(_History):
     """First-order adaptive windowing, end-fit: the longest window whose line misses no sample by more than the noise.
 
     Janabi-Sharifi, Hayward and Chen, "Discrete-time adaptive windowing for velocity estimation", IEEE T-CST 8(6),
@@ -164,37 +169,33 @@ class AdaptiveWindow:
         noise_m: bound of the error between line and samples [m].
     """
 
-    __slots__ = ("_history", "_noise_m", "_velocity_m_per_s")
+    __slots__ = ("_noise_m",)
 
     def __init__(self, samples: int, noise_m: float) -> None:
-        self._history = _History(samples + 1)
+        super().__init__(samples)
         self._noise_m = noise_m * (1.0 + 1e-9)
-
-    def start(self, position_m: float) -> None:
-        """Forget the past."""
-        self._history.start(position_m)
-        self._velocity_m_per_s = 0.0
 
     def update(self, position_m: float, dt_s: float, device_m_per_s: float) -> float:
         """Velocity now [m/s]; the last one while time stands still."""
         if dt_s <= 0.0:
-            return self._velocity_m_per_s
-        history = self._history
-        history.push(position_m, dt_s)
-        now_s = history.time_s[history.newest]
+            return self.velocity_m_per_s
+        time_s = self.time_s
+        push(self, self.position_m, time_s, position_m, dt_s)
+        newest = self.newest
+        now_s = time_s[newest]
         lowest = -math.inf
         highest = math.inf
-        for length in range(1, history.filled):
-            at = history.newest - length  # a negative index counts from the end, as the ring does
-            span_s = now_s - history.time_s[at]
-            slope = (position_m - history.position_m[at]) / span_s
+        for length in range(1, self.filled):
+            at = newest - length  # a negative index counts from the end, as the ring does
+            span_s = now_s - time_s[at]
+            slope = (position_m - self.position_m[at]) / span_s
             if not lowest <= slope <= highest:
                 break
-            self._velocity_m_per_s = slope
+            self.velocity_m_per_s = slope
             room = self._noise_m / span_s
             lowest = max(lowest, slope - room)
             highest = min(highest, slope + room)
-        return self._velocity_m_per_s
+        return self.velocity_m_per_s
 
 
 class DeviceVelocity:

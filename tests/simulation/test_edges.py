@@ -17,8 +17,8 @@ from hapticd.config.loading import parse
 from hapticd.config.models import WallConfig
 from hapticd.errors import ConfigError
 from hapticd.simulation.batch import Batch, Point
-from hapticd.simulation.batch.kernel import FARTHEST_M
 from hapticd.simulation.device import SimulatedDevice
+from hapticd.simulation.driver import FARTHEST_M
 from hapticd.simulation.options import SimulationOptions
 from tests.examples import examples
 

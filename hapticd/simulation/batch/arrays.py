@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from hapticd.simulation.batch.fields import fields_of, hints, records
-from hapticd.simulation.batch.kernel import TRACE_COLUMNS, LoopParams, LoopState, Segment
+from hapticd.simulation.batch.kernel import TRACE_COLUMNS, LoopParams, LoopState, Segment, WallState
 from hapticd.simulation.batch.prepare import Prepared
 from hapticd.simulation.compiler.compile import TICK_KINDS, kinds
 from hapticd.simulation.plant import PlantParams, PlantState
@@ -21,7 +21,7 @@ class Arrays(NamedTuple):
     """All points as arrays of records, and what does not fit into records as one flat array each.
 
     Attributes:
-        plants, loops, params, law_states, law_params, ticks, ledgers: a record a point.
+        plants, loops, params, law_states, law_params, ticks, walls, ledgers: a record a point.
         epochs, segments: those of all points, end to end; segments and `params` say which.
         lines, points_s, points_n, history_m, history_s: those of all points, end to end.
         line_from, points_from, history_from: where those of each point begin, and where the last ends.
@@ -44,6 +44,7 @@ class Arrays(NamedTuple):
     law_states: Array
     law_params: Array
     ticks: Array
+    walls: Array
     ledgers: Array
     traces: Array
 
@@ -80,6 +81,7 @@ def arrays_of(prepared: Sequence[Prepared], rows: int) -> Arrays:
         law_states=records([one.law_state for one in prepared], kinds(prepared[0].law_state)),
         law_params=records([one.law_params for one in prepared], prepared[0].law_param_kinds),
         ticks=records([one.tick for one in prepared], TICK_KINDS),
+        walls=records([one.wall for one in prepared], hints(WallState)),
         ledgers=records([ledger] * len(prepared), kinds(ledger)),
         traces=np.full((len(prepared), rows, len(TRACE_COLUMNS)), np.nan),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from types import ModuleType
+from typing import Any, NamedTuple
 
 from hapticd.errors import ConfigError
 from hapticd.law import state_fields
@@ -20,6 +21,48 @@ from hapticd.simulation.plant import Buffers, terms
 from hapticd.tick.energy import EnergyLedger
 
 
+class PlainLoop(NamedTuple):
+    """What `run` takes, as plain objects."""
+
+    plant: Any
+    plant_epochs: Any
+    buffers: Buffers
+    history: LoopBuffers
+    loop: Any
+    params: Any
+    segments: Any
+    law_state: Any
+    law_params: Any
+    tick: Any
+    wall: Any
+    ledger: EnergyLedger
+    trace: Any
+
+
+def plain_loop(prepared: Prepared, trace: Any) -> PlainLoop:
+    """A point before its first tick, for an interpreted run.
+
+    Args:
+        prepared: the point.
+        trace: where its trace goes, (rows, columns).
+    """
+    return PlainLoop(
+        plain(prepared.plant),
+        [plain(fields) for fields in prepared.epochs],
+        Buffers(list(prepared.line), *prepared.recorded),
+        LoopBuffers(list(prepared.history), [0.0] * len(prepared.history)),
+        plain(prepared.loop),
+        plain({**prepared.params, "first_segment": 0, "end_segment": len(prepared.segments)}),
+        [plain(fields) for fields in prepared.segments],
+        plain(prepared.law_state),
+        plain(prepared.law_params),
+        plain(prepared.tick),
+        plain(prepared.wall),
+        EnergyLedger(),
+        trace,
+    )
+
+
 class Batch:
     """A grid of loops with one law, ready to run.
 
@@ -33,6 +76,10 @@ class Batch:
 
     Raises:
         ConfigError: a point that cannot be simulated, named by its index.
+
+    Attributes:
+        prepared: the points as they wait for their run.
+        switches: which branches of the loop its points need.
     """
 
     def __init__(
@@ -48,27 +95,26 @@ class Batch:
             raise ConfigError("a batch needs at least one point")
         self.law = law
         self.points = points
-        self._prepared = []
+        self.prepared = []
         for at, point in enumerate(points):
             try:
-                self._prepared.append(Prepared(law, point, duration_s, window_s, trace_every))
+                self.prepared.append(Prepared(law, point, duration_s, window_s, trace_every))
             except ValueError as error:
                 raise ConfigError(f"points[{at}]: {error}") from error
         state_names = state_fields(law)
-        self._switches = {
-            "WALL_DAMPING": any(segment["damping_n_s_per_m"] for one in self._prepared for segment in one.segments),
+        self.switches = {
             "LONG_VELOCITY": any(point.velocity_samples > 1 for point in points),
             "LIMIT": any(point.max_force_n < math.inf for point in points),
             "LEDGER": ledger,
             "LAW_DAMPING": "damping_n_s_per_m" in state_names,
             "LAW_MASS": "felt_mass_kg" in state_names,
-            "SETTLING": any(not math.isnan(float(one.params["target_m"])) for one in self._prepared),
+            "SETTLING": any(not math.isnan(float(one.params["target_m"])) for one in self.prepared),
             "TRACE": trace_every > 0,
         }
         for point in points:
             for name, on in terms(point.device).items():
-                self._switches[name] = self._switches.get(name, False) or on
-        self._rows = max(one.ticks for one in self._prepared) // trace_every if trace_every else 0
+                self.switches[name] = self.switches.get(name, False) or on
+        self._rows = max(one.ticks for one in self.prepared) // trace_every if trace_every else 0
 
     def run(self, workers: int | None = None, progress: Callable[[int], None] | None = None) -> BatchResult:
         """Run every point as machine code.
@@ -86,41 +132,25 @@ class Batch:
 
     def result(self, arrays: Arrays) -> BatchResult:
         """What became of the points, from the arrays that they were run on."""
-        return result_of(self._prepared, arrays)
+        return result_of(self.prepared, arrays)
 
     def arrays(self) -> Arrays:
         """Every point as it is before its first tick."""
-        return arrays_of(self._prepared, self._rows)
+        return arrays_of(self.prepared, self._rows)
 
     def run_on(self, arrays: Arrays, workers: int | None = None, progress: Callable[[int], None] | None = None) -> None:
         """Run every point as machine code, from and into these arrays; called again, it goes on where it was."""
-        code = machine_code(self.law, tuple(sorted(self._switches.items())))
-        in_threads(code, len(self._prepared), arrays, workers=workers, progress=progress)
+        code = machine_code(self.law, tuple(sorted(self.switches.items())))
+        in_threads(code, len(self.prepared), arrays, workers=workers, progress=progress)
 
     def run_interpreted(self) -> BatchResult:
         """Run every point as plain Python: the same numbers, about a hundred times slower."""
-        loop = bound(self._switches, self.law.step, EnergyLedger.update)
+        loop = bound(self.switches, self.law.step)
         arrays = self.arrays()
-        for at, one in enumerate(self._prepared):
-            plant = plain(one.plant)
-            state = plain(one.loop)
-            ledger = EnergyLedger()
-            law_state = plain(one.law_state)
-            loop(
-                plant,
-                [plain(fields) for fields in one.epochs],
-                Buffers(list(one.line), *one.recorded),
-                LoopBuffers(list(one.history), [0.0] * len(one.history)),
-                state,
-                plain({**one.params, "first_segment": 0, "end_segment": len(one.segments)}),
-                [plain(fields) for fields in one.segments],
-                law_state,
-                plain(one.law_params),
-                plain(one.tick),
-                ledger,
-                arrays.traces[at],
-            )
-            store(arrays.loops[at], state)
-            store(arrays.ledgers[at], ledger)
-            store(arrays.law_states[at], law_state)
-        return result_of(self._prepared, arrays)
+        for at, one in enumerate(self.prepared):
+            objects = plain_loop(one, arrays.traces[at])
+            loop(*objects)
+            store(arrays.loops[at], objects.loop)
+            store(arrays.ledgers[at], objects.ledger)
+            store(arrays.law_states[at], objects.law_state)
+        return result_of(self.prepared, arrays)

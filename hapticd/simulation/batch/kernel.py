@@ -1,7 +1,10 @@
 """One loop from its first tick to its last.
 
-The order of a tick is the daemon's: move, sample, velocity, contact, law, limit, books, write. What the daemon does at
-transitions is not here: a loop that starts inside the wall has its force at once, without a ramp.
+The order of a tick is the daemon's: move, sample, velocity, contact, law, limit, books, write. Velocity, wall, law and
+books are the daemon's own functions; the order of `Motion.see`, `Contact`, `Guard.reduce` and `ControlTick.step` is
+written down once more, for one axis, one wall and an armed guard. tests/simulation/test_kernel_and_tick.py finds any
+line of the two that goes apart. What the daemon does at transitions is not here: a loop that starts inside the wall has
+its force at once, without a ramp.
 
 Memory does not grow with the simulated time unless a trace is asked for. Switches in capitals are what a loop has,
 beside the terms of the plant; `bound` removes the branches of the others.
@@ -13,9 +16,14 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from hapticd.simulation.compiler.specialise import specialise
+from hapticd.simulation.driver import FARTHEST_M
 from hapticd.simulation.plant import move, sense
+from hapticd.tick.contact import MOST
+from hapticd.tick.energy import EnergyLedger
+from hapticd.tick.motion import MOST_M_PER_S
+from hapticd.tick.scene import Wall
+from hapticd.tick.velocity import Difference, push
 
-WALL_DAMPING: bool = True
 LONG_VELOCITY: bool = True
 LIMIT: bool = True
 LEDGER: bool = True
@@ -24,10 +32,13 @@ LAW_MASS: bool = True
 SETTLING: bool = True
 TRACE: bool = True
 
-FARTHEST_M = 1e6
-MOST = 1e18
-MOST_M_PER_S = 1e6
 TRACE_COLUMNS = ("x_m", "v_m_per_s", "x_measured_m", "force_n", "energy_j", "damping_n_s_per_m")
+
+# The daemon's own, on whatever has the fields that they use.
+difference: Callable[..., float] = Difference.update
+wall_force: Callable[..., float] = Wall.force
+wall_stored_j: Callable[..., float] = Wall.stored_j
+ledger_update: Callable[..., None] = EnergyLedger.update
 
 
 class LoopBuffers(NamedTuple):
@@ -43,6 +54,7 @@ class LoopState:
     force_n: float
     last_m: float
     velocity_m_per_s: float
+    size: int
     newest: int
     filled: int
     applied_spring_n: float
@@ -58,6 +70,14 @@ class LoopState:
     outside_tick: int
     ticks: int
     finite: bool
+
+
+class WallState:
+    """The wall now: the fields of `hapticd.tick.scene.Wall` that its forces take."""
+
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+    spring_n: float
 
 
 class LoopParams:
@@ -89,20 +109,6 @@ def law_step(state: Any, params: Any, tick: Any) -> float:
     raise NotImplementedError
 
 
-def ledger_update(
-    ledger: Any,
-    moved_m: float,
-    applied_n: float,
-    spring_n: float,
-    stored_j: float,
-    inside: bool,
-    damping: float,
-    dt_s: float,
-) -> None:
-    """Stands for `EnergyLedger.update`."""
-    raise NotImplementedError
-
-
 def run(
     plant: Any,
     plant_epochs: Any,
@@ -114,6 +120,7 @@ def run(
     law_state: Any,
     law_params: Any,
     tick: Any,
+    wall: Any,
     ledger: Any,
     trace: Any,
 ) -> None:
@@ -121,8 +128,8 @@ def run(
     for at in range(params.first_segment, params.end_segment):
         segment = segments[at]
         plant_params = plant_epochs[segment.epoch]
-        stiffness = segment.stiffness_n_per_m
-        wall_damping = segment.damping_n_s_per_m
+        wall.stiffness_n_per_m = segment.stiffness_n_per_m
+        wall.damping_n_s_per_m = segment.damping_n_s_per_m
         last_window = segment.last_window
         for count in range(segment.start, segment.stop):
             loop.ticks = count
@@ -135,10 +142,12 @@ def run(
 
             # velocity
             if LONG_VELOCITY and params.samples > 1:
-                velocity = long_difference(loop, params, history, x_m)
+                push(loop, history.position_m, history.time_s, x_m, params.dt_s)
+                oldest = (loop.newest + 1 - loop.filled) % loop.size
+                span_s = history.time_s[loop.newest] - history.time_s[oldest]
+                velocity = (x_m - history.position_m[oldest]) / span_s
             else:
-                velocity = (x_m - loop.last_m) / params.dt_s
-            loop.last_m = x_m
+                velocity = difference(loop, x_m, params.dt_s, 0.0)
             if not (-MOST_M_PER_S < velocity < MOST_M_PER_S):
                 loop.finite = False
                 return
@@ -147,21 +156,27 @@ def run(
             tick.moved_m = x_m - tick.x_m
             tick.x_m = x_m
             tick.velocity_m_per_s = velocity
-            spring_n = 0.0
             if x_m < 0.0:
                 tick.in_contact = True
-                spring_n = -stiffness * x_m
-                contact_n = spring_n
-                if WALL_DAMPING and wall_damping != 0.0:
-                    contact_n = spring_n - wall_damping * velocity
-                tick.contact_n = contact_n
+                tick.contact_n = wall_force(wall, x_m, velocity)
+                tick.spring_n = wall.spring_n
             else:
                 tick.in_contact = False
                 tick.contact_n = 0.0
-            tick.spring_n = spring_n
+                tick.spring_n = wall.spring_n = 0.0
 
             # law
             force_n = law_step(law_state, law_params, tick)
+            if LAW_DAMPING:
+                loop.damping_n_s_per_m = law_state.damping_n_s_per_m
+                if not (-MOST < loop.damping_n_s_per_m < MOST):
+                    loop.finite = False
+                    return
+            if LAW_MASS:
+                loop.felt_mass_kg = law_state.felt_mass_kg
+                if not (-MOST < loop.felt_mass_kg < MOST):
+                    loop.finite = False
+                    return
             if not tick.in_contact:
                 force_n = 0.0
             if not (-MOST < force_n < MOST):
@@ -174,28 +189,19 @@ def run(
                 share = params.limit_n / abs(force_n)
 
             # books
-            if LAW_DAMPING:
-                loop.damping_n_s_per_m = law_state.damping_n_s_per_m
-            if LAW_MASS:
-                loop.felt_mass_kg = law_state.felt_mass_kg
             if LEDGER:
-                stored_j = 0.0
-                if x_m < 0.0:
-                    stored_j = -0.5 * spring_n * x_m
-                    if LIMIT and spring_n > params.limit_n:
-                        stored_j = params.limit_n * (-x_m - 0.5 * params.limit_n / stiffness)
                 ledger_update(
                     ledger,
                     tick.moved_m,
                     tick.applied_n,
                     loop.applied_spring_n,
-                    stored_j,
+                    wall_stored_j(wall, x_m, params.limit_n),
                     tick.in_contact,
                     loop.damping_n_s_per_m,
                     params.dt_s,
                 )
-                loop.applied_spring_n = spring_n
-                if LIMIT and spring_n > params.limit_n:
+                loop.applied_spring_n = wall.spring_n
+                if LIMIT and wall.spring_n > params.limit_n:
                     loop.applied_spring_n = params.limit_n
             tick.applied_n = share * force_n
             tick.applied_contact_n = share * tick.contact_n
@@ -215,25 +221,6 @@ def run(
             if TRACE and (count + 1) % params.trace_every == 0:
                 record(plant, loop, ledger, trace, count // params.trace_every)
         loop.ticks = segment.stop
-
-
-def long_difference(loop: Any, params: Any, history: Any, position_m: float) -> float:
-    """`hapticd.tick.velocity.LongDifference`, step by step, times included: its sums decide the last bit."""
-    size = params.samples + 1
-    last_s = history.time_s[loop.newest]
-    if last_s > 10.0:
-        for at in range(size):
-            history.time_s[at] -= last_s
-        last_s = 0.0
-    loop.newest = (loop.newest + 1) % size
-    history.position_m[loop.newest] = position_m
-    history.time_s[loop.newest] = last_s + params.dt_s
-    if loop.filled < size:
-        loop.filled += 1
-    oldest = (loop.newest + 1 - loop.filled + size) % size
-    span_s = history.time_s[loop.newest] - history.time_s[oldest]
-    velocity_m_per_s: float = (position_m - history.position_m[oldest]) / span_s
-    return velocity_m_per_s
 
 
 def report(plant: Any, loop: Any) -> None:
@@ -260,9 +247,9 @@ def record(plant: Any, loop: Any, ledger: Any, trace: Any, row: int) -> None:
     trace[row, 5] = loop.damping_n_s_per_m
 
 
-def bound(switches: Mapping[str, bool], step: Callable[..., Any], update: Callable[..., Any]) -> Callable[..., None]:
-    """`run` with the terms, the law and the ledger that it needs."""
-    calls: dict[str, Callable[..., Any]] = {"law_step": step, "ledger_update": update}
+def bound(switches: Mapping[str, bool], step: Callable[..., Any]) -> Callable[..., None]:
+    """`run` with the terms that it needs and this law."""
+    calls: dict[str, Callable[..., Any]] = {"law_step": step}
     calls["move"] = specialise(move, switches)
     calls["sense"] = specialise(sense, switches)
     return specialise(run, switches, calls)

@@ -11,7 +11,6 @@ from numba import njit
 from hapticd.simulation.batch.kernel import LoopBuffers, bound
 from hapticd.simulation.compiler.compile import OPTIONS, compiled, compiled_step, on_stack
 from hapticd.simulation.plant import Buffers
-from hapticd.tick.energy import EnergyLedger
 
 
 @lru_cache(maxsize=32)
@@ -22,7 +21,7 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
         PluginError: the law cannot be compiled.
     """
     memo = {law.step: compiled_step(law)}
-    loop = compiled(bound(dict(switches), law.step, EnergyLedger.update), memo)
+    loop = compiled(bound(dict(switches), law.step), memo)
 
     @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def one(at: Any, arrays: Any) -> None:
@@ -30,6 +29,7 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
         state = on_stack(arrays.loops[at])
         tick = on_stack(arrays.ticks[at])
         law_state = on_stack(arrays.law_states[at])
+        wall = on_stack(arrays.walls[at])
         ledger = on_stack(arrays.ledgers[at])
         line = slice(arrays.line_from[at], arrays.line_from[at + 1])
         points = slice(arrays.points_from[at], arrays.points_from[at + 1])
@@ -45,6 +45,7 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
             law_state,
             on_stack(arrays.law_params[at]),
             tick,
+            wall,
             ledger,
             arrays.traces[at],
         )
@@ -52,6 +53,7 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
         arrays.loops[at] = state
         arrays.ticks[at] = tick
         arrays.law_states[at] = law_state
+        arrays.walls[at] = wall
         arrays.ledgers[at] = ledger
 
     @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types

@@ -18,7 +18,7 @@ class Point:
         device: the device model, hand included.
         wall: stiffness, damping and their changes; where it stands does not matter.
         params: the law's parameters.
-        period_s: time between ticks [s].
+        period_s: time between ticks, whole nanoseconds where it is to be the daemon's to the last bit [s].
         max_force_n: the guard's limit [N].
         velocity_samples: samples that the velocity difference spans.
         target_m: where it should settle; NaN: nowhere, then no settling time is looked for [m].

@@ -9,7 +9,7 @@ from typing import Any
 from hapticd.config.timing import first_tick
 from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params, state_fields
 from hapticd.simulation.batch.fields import fields_of, hints, plain
-from hapticd.simulation.batch.kernel import LoopState
+from hapticd.simulation.batch.kernel import LoopState, WallState
 from hapticd.simulation.batch.point import Point
 from hapticd.simulation.compiler.compile import param_kinds
 from hapticd.simulation.compiler.specialise import specialise
@@ -46,6 +46,7 @@ class Prepared:
         tick.x_m = start_m
         tick.dt_s = period_s
         self.tick = fields_of(tick)
+        self.wall = dict.fromkeys(hints(WallState), 0.0)
         self.segments = self._segments(point, [first for first, _ in changes])
         self.params: dict[str, Any] = {
             "dt_s": period_s,
@@ -59,6 +60,7 @@ class Prepared:
         }
         self.loop: dict[str, Any] = {name: kind(0) for name, kind in hints(LoopState).items()} | {
             "last_m": start_m,
+            "size": len(self.history),
             "filled": 1,
             "low_m": math.inf,
             "high_m": -math.inf,
