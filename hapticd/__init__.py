@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from hapticd.offline.simulate import simulate
     from hapticd.offline.sweep import Grid, sweep
 
-__version__ = "0.2.0"
+from hapticd.version import __version__
 
-__all__ = ["Grid", "LoadedConfig", "Outcome", "Run", "connect", "load", "simulate", "sweep"]
+__all__ = ["Grid", "LoadedConfig", "Outcome", "Run", "__version__", "connect", "load", "simulate", "sweep"]
 
 _HOMES = {
     "connect": "hapticd.client.daemon",

@@ -12,7 +12,7 @@ from typing import Final
 
 import typer
 
-from hapticd import __version__
+from hapticd.version import __version__
 
 COMMANDS: Final = {
     "run": ("run", "Run the daemon in the foreground until it is interrupted."),

@@ -15,7 +15,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from hapticd import __version__
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.examination import SCHEMA, Examination, verdict
 from hapticd.doctor.finding import Finding, Mark
@@ -23,6 +22,7 @@ from hapticd.doctor.latency import Latency
 from hapticd.paths import DEFAULT_INSTANCE, default_config, runtime_directory
 from hapticd.progress import progress_bar
 from hapticd.telemetry.records import LATE_EDGES_US
+from hapticd.version import __version__
 
 _STYLES: dict[Mark, str] = {"ok": "green", "advice": "yellow", "problem": "bold red", "unknown": "cyan"}
 _COUNTED = {"problem": "problems", "advice": "advice", "unknown": "could not tell", "ok": "ok"}

@@ -16,12 +16,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import hapticd
 from hapticd.config.loading import LoadedConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import HapticdError
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.record import RecordLayout, TickRecord
+from hapticd.version import __version__
 
 MAGIC = b"hapticd fault record 1\n"
 SUFFIX = ".fault"
@@ -139,7 +139,7 @@ def receipt(event: LoopEvent, epoch_s: float, instance: str, config: LoadedConfi
         {
             "event": {**asdict(event), "name": EventCode(event.code).name, "timestamp": epoch_s},
             "instance": instance,
-            "version": hapticd.__version__,
+            "version": __version__,
             "driver": config.config.device.driver,
             "device": asdict(info),
             "rate_hz": config.config.loop.rate_hz,

@@ -17,8 +17,8 @@ from hapticd.errors import ConfigError, DriverError
 from hapticd.offline.outcome import Criterion, balance
 from hapticd.offline.run import Row, Run, window_ticks
 from hapticd.simulation.device import SimulatedDevice
-from hapticd.simulation.driver import FARTHEST_M, SimulatedDriver
-from hapticd.simulation.options import SimulationOptions
+from hapticd.simulation.driver import SimulatedDriver
+from hapticd.simulation.options import FARTHEST_M, SimulationOptions
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.guard import Mode
 

@@ -125,6 +125,11 @@ class Run:
         return Criterion().outcome(self.options, self.balance, self.peak_to_peak_m, self.mean_m)
 
     @property
+    def settled(self) -> bool:
+        """Whether the device came to rest in its place."""
+        return self.outcome is Outcome.SETTLED
+
+    @property
     def settled_tick(self) -> int | None:
         """The first tick from which on it stayed where it should rest; None when it does not or has no such place."""
         stayed = self.fault is None and self.left_place_tick < self.ticks - 1

@@ -11,11 +11,8 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverStateError
 from hapticd.simulation.device import SimulatedDevice
-from hapticd.simulation.options import SimulationOptions
+from hapticd.simulation.options import FARTHEST_M, SimulationOptions
 from hapticd.simulation.plant import epochs
-
-FARTHEST_M = 1e6
-"""A model that has gone this far from its wall has diverged [m]."""
 
 MOST_CATCH_UP_S = 1.0
 """clock = "wall": a host that was stopped for longer makes up for this much [s]."""

@@ -12,6 +12,9 @@ from pydantic import AfterValidator, Field, model_validator
 from hapticd.driver import DriverOptions
 from hapticd.simulation.presets import PRESETS
 
+FARTHEST_M = 1e6
+"""A model that has gone this far from its wall has diverged [m]."""
+
 MAX_DELAY_SAMPLES = 128
 _FORCE = 1e6  # [N], far beyond any hand: a bound only against slips of the pen
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import hapticd
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.models import SafetyConfig, WallConfig
 from hapticd.device import DeviceInfo
@@ -22,6 +21,7 @@ from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.flags import Flag
 from hapticd.tick.guard import limits
 from hapticd.tick.record import TickRecord
+from hapticd.version import __version__
 
 _RATE_S = 0.5
 """Shortest time that a measured rate is taken over [s]."""
@@ -111,7 +111,7 @@ class StatusBuilder:
             self.expect(recovery.resume)
         flags = self._flags
         self.made = Status(
-            version=hapticd.__version__,
+            version=__version__,
             instance=self._instance,
             rate_hz=settings.loop.rate_hz,
             measured_rate_hz=self.rate_hz,

@@ -2,7 +2,7 @@
 
     class TestMyRig(hapticd.testing.DriverContract): ...          a fixture and a method name driver and device
     class TestMyLaw(hapticd.testing.LawContract): law = "mylab.my_law"
-    hapticd.testing.press("mylab.my_law", stiffness_n_per_m=12e3).outcome
+    hapticd.testing.press("mylab.my_law", stiffness_n_per_m=12e3).settled
 
 The suites need pytest; `press` does not. The built-in drivers and laws pass the same suites.
 """
@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hapticd.testing.driver_contract import DriverContract
     from hapticd.testing.law_contract import LawContract
-    from hapticd.testing.law_press import Press, press
+    from hapticd.testing.law_press import press
 
-__all__ = ["DriverContract", "LawContract", "Press", "press"]
+__all__ = ["DriverContract", "LawContract", "press"]
 
 _MODULES = {
     "DriverContract": "hapticd.testing.driver_contract",
     "LawContract": "hapticd.testing.law_contract",
-    "Press": "hapticd.testing.law_press",
     "press": "hapticd.testing.law_press",
 }
 

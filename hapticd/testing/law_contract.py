@@ -112,8 +112,8 @@ class LawContract:
             table = params.model_dump(exclude_unset=True)
             made = press(module.__name__, table, start_m=0.003, duration_s=1.0, device={"hand": {"force": _TAPPING}})
             assert made.fault is None, f"{params!r}: {made.fault}"
-            outside = [force for x, force in zip(made.run.measured_m, made.run.force_n, strict=True) if not x < 0.0]
-            assert 10 < len(outside) < len(made.run.force_n), "it was tapped and it was let go"
+            outside = [force for x, force in zip(made.x_measured_m, made.force_n, strict=True) if not x < 0.0]
+            assert 10 < len(outside) < len(made.force_n), "it was tapped and it was let go"
             assert not any(outside), f"{params!r} pushes outside the wall"
 
     def test_interpreted_and_compiled_agree_to_the_last_bit(self, module: ModuleType, tried: list[LawParams]) -> None:

@@ -3,30 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import tomlkit
 
-from hapticd.config.loading import LoadedConfig, parse
-from hapticd.offline.model_choice import fitted
-from hapticd.offline.run import Played, play
-
-
-@dataclass(frozen=True, slots=True)
-class Press:
-    """What became of a press.
-
-    Attributes:
-        outcome: "settled", "still, but out of place", "keeps moving" or "diverged"; "stopped" where the daemon would
-            have stopped, for example since the law failed; "runs" where the hand never comes to rest.
-        fault: why the daemon would have stopped; None when it would not.
-        run: every tick: `run.x_m`, `run.force_n`, `run.energy_j` and more.
-    """
-
-    outcome: str
-    fault: str | None
-    run: Played = field(repr=False)
+from hapticd.config.loading import parse
+from hapticd.offline.run import Run
+from hapticd.offline.simulate import simulate
 
 
 def press(
@@ -39,7 +22,7 @@ def press(
     duration_s: float = 3.0,
     rate_hz: float = 1000.0,
     device: Mapping[str, Any] | None = None,
-) -> Press:
+) -> Run:
     """Press a wall with a constant force and say what became of it; the tick is the daemon's, the device simulated.
 
     Args:
@@ -52,6 +35,9 @@ def press(
         rate_hz: ticks a second [Hz].
         device: more keys of [device.options], such as `{"model": "falcon", "force_delay_samples": 1}`.
 
+    Returns:
+        The run: `settled`, `outcome`, `fault`, and every tick.
+
     Raises:
         ConfigError: a law, a parameter or a value that a configuration could not have.
         DriverError: the device cannot be stepped at this rate.
@@ -63,9 +49,4 @@ def press(
         "scene": {"walls": [{"stiffness_n_per_m": stiffness_n_per_m}]},
         "controller": {"law": law, "params": dict(params or {})},
     }
-    return _simulated(parse(tomlkit.dumps(tables), "press"), duration_s)
-
-
-def _simulated(config: LoadedConfig, duration_s: float) -> Press:
-    run = play(fitted(config), duration_s)
-    return Press(run.verdict, run.fault, run)
+    return simulate(parse(tomlkit.dumps(tables), "press"), duration_s)

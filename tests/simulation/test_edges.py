@@ -18,8 +18,7 @@ from hapticd.config.models import WallConfig
 from hapticd.errors import ConfigError
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.device import SimulatedDevice
-from hapticd.simulation.driver import FARTHEST_M
-from hapticd.simulation.options import SimulationOptions
+from hapticd.simulation.options import FARTHEST_M, SimulationOptions
 from tests.examples import examples
 
 

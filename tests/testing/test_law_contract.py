@@ -9,6 +9,7 @@ import sys
 import pytest
 
 import hapticd.testing
+from hapticd import Outcome
 from hapticd.errors import ConfigError
 from hapticd.testing import press
 
@@ -95,18 +96,18 @@ def test_the_report_names_the_field_or_the_tick(reports: dict[str, str], name: s
 
 
 def test_a_press_says_what_became_of_it() -> None:
-    assert press("none", stiffness_n_per_m=3e3).outcome == "settled"
+    assert press("none", stiffness_n_per_m=3e3).settled
     rattling = press("none", stiffness_n_per_m=12e3, start_m=0.002)
-    assert repr(rattling) == "Press(outcome='keeps moving', fault=None)"
-    assert len(rattling.run.x_m) == 3000
+    assert (str(rattling.outcome), rattling.settled, rattling.fault) == ("keeps moving", False, None)
+    assert len(rattling.x_m) == 3000
     capped = {"cap": "fixed", "cap_damping_n_s_per_m": 0.1}
-    assert press("energy-cycle", stiffness_n_per_m=12e3, start_m=0.002).outcome == "settled"
-    assert press("energy-cycle", capped, stiffness_n_per_m=12e3, start_m=0.002).outcome == "keeps moving"
+    assert press("energy-cycle", stiffness_n_per_m=12e3, start_m=0.002).settled
+    assert press("energy-cycle", capped, stiffness_n_per_m=12e3, start_m=0.002).outcome is Outcome.MOVING
 
 
 def test_a_press_takes_the_keys_of_a_configuration_and_refuses_others() -> None:
     brief = press("none", rate_hz=2000.0, duration_s=0.1, device={"model": "falcon"}, hand_n=-1.0)
-    assert (len(brief.run.x_m), brief.run.options.model) == (200, "falcon")
+    assert (len(brief.x_m), brief.options.model) == (200, "falcon")
     with pytest.raises(ConfigError, match=r"press: controller\.params\.windw = 3: unknown key"):
         press("energy-cycle", {"windw": 3})
     with pytest.raises(ConfigError, match=r'press: controller\.law = "magic": not installed'):

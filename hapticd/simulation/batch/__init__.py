@@ -6,8 +6,9 @@ test interpreted, and both give the daemon's numbers to the last bit.
 
 from hapticd.simulation.batch.arrays import Arrays
 from hapticd.simulation.batch.engine import Batch
-from hapticd.simulation.batch.kernel import TRACE_COLUMNS, run
+from hapticd.simulation.batch.kernel import run
 from hapticd.simulation.batch.point import Point
 from hapticd.simulation.batch.result import BatchResult
+from hapticd.simulation.batch.state import TRACE_COLUMNS
 
 __all__ = ["TRACE_COLUMNS", "Arrays", "Batch", "BatchResult", "Point", "run"]

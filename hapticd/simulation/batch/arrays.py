@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from hapticd.simulation.batch.fields import fields_of, hints, records
-from hapticd.simulation.batch.kernel import TRACE_COLUMNS, LoopParams, LoopState, Segment, WallState
 from hapticd.simulation.batch.prepare import Prepared
+from hapticd.simulation.batch.state import TRACE_COLUMNS, LoopParams, LoopState, Segment, WallState
 from hapticd.simulation.compiler.compile import TICK_KINDS, kinds
 from hapticd.simulation.plant import PlantParams, PlantState
 from hapticd.tick.energy import EnergyLedger

@@ -11,11 +11,12 @@ from hapticd.errors import ConfigError
 from hapticd.law import state_fields
 from hapticd.simulation.batch.arrays import Arrays, arrays_of
 from hapticd.simulation.batch.fields import plain, store
-from hapticd.simulation.batch.kernel import LoopBuffers, bound
+from hapticd.simulation.batch.kernel import bound
 from hapticd.simulation.batch.machine_code import machine_code
 from hapticd.simulation.batch.point import Point
 from hapticd.simulation.batch.prepare import Prepared
 from hapticd.simulation.batch.result import BatchResult, result_of
+from hapticd.simulation.batch.state import LoopBuffers
 from hapticd.simulation.compiler.threads import in_threads
 from hapticd.simulation.plant import Buffers, terms
 from hapticd.tick.energy import EnergyLedger

@@ -13,10 +13,10 @@ beside the terms of the plant; `bound` removes the branches of the others.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from hapticd.simulation.compiler.specialise import specialise
-from hapticd.simulation.driver import FARTHEST_M
+from hapticd.simulation.options import FARTHEST_M
 from hapticd.simulation.plant import move, sense
 from hapticd.tick.contact import MOST
 from hapticd.tick.energy import EnergyLedger
@@ -32,76 +32,11 @@ LAW_MASS: bool = True
 SETTLING: bool = True
 TRACE: bool = True
 
-TRACE_COLUMNS = ("x_m", "v_m_per_s", "x_measured_m", "force_n", "energy_j", "damping_n_s_per_m")
-
 # The daemon's own, on whatever has the fields that they use.
 difference: Callable[..., float] = Difference.update
 wall_force: Callable[..., float] = Wall.force
 wall_stored_j: Callable[..., float] = Wall.stored_j
 ledger_update: Callable[..., None] = EnergyLedger.update
-
-
-class LoopBuffers(NamedTuple):
-    """Histories of the loop: lists when interpreted, arrays when compiled."""
-
-    position_m: Any
-    time_s: Any
-
-
-class LoopState:
-    """What the loop remembers, and what it reports at the end."""
-
-    force_n: float
-    last_m: float
-    velocity_m_per_s: float
-    size: int
-    newest: int
-    filled: int
-    applied_spring_n: float
-    low_m: float
-    high_m: float
-    low_measured_m: float
-    high_measured_m: float
-    sum_x_m: float
-    sum_force_n: float
-    peak_force_n: float
-    damping_n_s_per_m: float
-    felt_mass_kg: float
-    outside_tick: int
-    ticks: int
-    finite: bool
-
-
-class WallState:
-    """The wall now: the fields of `hapticd.tick.scene.Wall` that its forces take."""
-
-    stiffness_n_per_m: float
-    damping_n_s_per_m: float
-    spring_n: float
-
-
-class LoopParams:
-    """What one loop is given."""
-
-    dt_s: float
-    limit_n: float
-    samples: int
-    target_m: float
-    band_m: float
-    first_segment: int
-    end_segment: int
-    trace_every: int
-
-
-class Segment:
-    """Ticks over which nothing is changed from outside."""
-
-    start: int
-    stop: int
-    epoch: int
-    stiffness_n_per_m: float
-    damping_n_s_per_m: float
-    last_window: bool
 
 
 def law_step(state: Any, params: Any, tick: Any) -> float:

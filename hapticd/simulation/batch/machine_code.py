@@ -8,7 +8,8 @@ from typing import Any
 
 from numba import njit
 
-from hapticd.simulation.batch.kernel import LoopBuffers, bound
+from hapticd.simulation.batch.kernel import bound
+from hapticd.simulation.batch.state import LoopBuffers
 from hapticd.simulation.compiler.compile import OPTIONS, compiled, compiled_step, on_stack
 from hapticd.simulation.plant import Buffers
 

@@ -9,8 +9,8 @@ from typing import Any
 from hapticd.config.timing import first_tick
 from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params, state_fields
 from hapticd.simulation.batch.fields import fields_of, hints, plain
-from hapticd.simulation.batch.kernel import LoopState, WallState
 from hapticd.simulation.batch.point import Point
+from hapticd.simulation.batch.state import LoopState, WallState
 from hapticd.simulation.compiler.compile import param_kinds
 from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.plant import delay_line, epochs, recorded_points, sense, start_state, terms

@@ -9,8 +9,8 @@ from typing import Any
 
 from rich.table import Table
 
-import hapticd
 from hapticd.offline.outcome import Criterion
+from hapticd.version import __version__
 from hapticd_studies.accuracy.continuous import BounceRow
 from hapticd_studies.accuracy.control import SETTLING_S, STIFFNESSES_N_PER_M, RateRow, VelocityRow, WindowRow
 from hapticd_studies.accuracy.cycles import Detection
@@ -196,7 +196,7 @@ class AccuracyReport:
         return as_json(
             {
                 "study": "accuracy",
-                "hapticd": hapticd.__version__,
+                "hapticd": __version__,
                 "config": self.name,
                 "duration_s": self.duration_s,
                 "criterion": Criterion().declared(),

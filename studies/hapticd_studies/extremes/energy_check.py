@@ -26,7 +26,7 @@ from numba import njit
 from hapticd.simulation.batch import TRACE_COLUMNS
 from hapticd.simulation.compiler.compile import OPTIONS, compiled, on_stack
 from hapticd.simulation.compiler.threads import in_threads
-from hapticd.simulation.driver import FARTHEST_M
+from hapticd.simulation.options import FARTHEST_M
 from hapticd.tick.motion import MOST_M_PER_S
 from hapticd_studies.extremes.case import LoopCase
 from hapticd_studies.extremes.exact import free_period, friction_integrals

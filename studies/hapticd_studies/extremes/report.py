@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-import hapticd
 from hapticd.offline.outcome import Criterion
+from hapticd.version import __version__
 from hapticd_studies.extremes.case import DRAWN, LAWS, draw
 from hapticd_studies.extremes.ceilings import Break
 from hapticd_studies.extremes.findings import ExtremesFinding, findings
@@ -83,7 +83,7 @@ class ExtremesReport:
         return as_json(
             {
                 "study": "extremes",
-                "hapticd": hapticd.__version__,
+                "hapticd": __version__,
                 "seed": self.plan.seed,
                 "places": self.plan.count,
                 "drawn": DRAWN,

@@ -12,6 +12,7 @@ from typing import Any
 
 import hapticd
 from hapticd import plugins
+from hapticd.version import __version__
 from hapticd_studies.grid.journal import Row
 
 Work = Callable[[Any, int, int | None], list[Row]]
@@ -64,7 +65,7 @@ def code_digest(laws: tuple[str, ...]) -> str:
     package = Path(hapticd.__file__).parent
     found = [(str(file.relative_to(package)), file.read_bytes()) for file in sorted(package.rglob("*.py"))]
     found += [(law, Path(inspect.getfile(plugins.law(law))).read_bytes()) for law in sorted(laws)]
-    digest = hashlib.sha256(hapticd.__version__.encode())
+    digest = hashlib.sha256(__version__.encode())
     for name, source in found:
         digest.update(f"\0{name}\0{len(source)}\0".encode() + source)
     return digest.hexdigest()

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hapticd import __version__
 from hapticd.offline.outcome import Criterion
+from hapticd.version import __version__
 from hapticd_studies.grid.output import as_json, write
 from hapticd_studies.paper import readings, starts, style
 from hapticd_studies.paper.claims import HELD, Claim, Evidence

@@ -10,8 +10,8 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-import hapticd
 from hapticd.offline.outcome import Outcome
+from hapticd.version import __version__
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.robustness.devices import DRAWN, DURATION_S, WITHIN_REACH, Device
 from hapticd_studies.robustness.readings import PAPER, short
@@ -129,7 +129,7 @@ class RobustnessReport:
         return as_json(
             {
                 "study": "robustness",
-                "hapticd": hapticd.__version__,
+                "hapticd": __version__,
                 "seed": self.plan.seed,
                 "devices": len(self.devices),
                 "drawn": DRAWN,

@@ -8,8 +8,8 @@ from dataclasses import asdict
 
 from rich.table import Table
 
-import hapticd
 from hapticd.offline.outcome import Criterion
+from hapticd.version import __version__
 from hapticd_studies.grid.output import as_json
 from hapticd_studies.scene.answers import Answers
 from hapticd_studies.scene.study import Scene
@@ -84,7 +84,7 @@ def json(scene: Scene, ticks: Sequence[TickCount], duration_s: float) -> bytes:
     return as_json(
         {
             "study": "scene",
-            "hapticd": hapticd.__version__,
+            "hapticd": __version__,
             "config": str(scene.loaded.path),
             "duration_s": duration_s,
             "tolerance": scene.tolerance,

@@ -10,9 +10,9 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-import hapticd
 from hapticd.config.loading import parse
 from hapticd.offline.outcome import PRESSED, Outcome
+from hapticd.version import __version__
 from hapticd_studies.boundaries import BOUNDARIES
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.zwidth.curves import Curve, curves, limits
@@ -91,7 +91,7 @@ class ZwidthReport:
         return as_json(
             {
                 "study": "zwidth",
-                "hapticd": hapticd.__version__,
+                "hapticd": __version__,
                 "press": plan.text,
                 "method": plan.method,
                 "duration_s": plan.duration_s,
