@@ -1,0 +1,332 @@
+"""Damping that is there while the contact rings, and lets go.
+
+The paper spreads what a wall generated over the next press and release (energy_cycle.py). Between linear spring and
+held force that amount is known beforehand: (k dt / 2) sum v^2 dt. So damping has two parts here:
+
+    F = F_contact - (base + brake) v                       the paper's eq. 9, alpha = base + brake
+    base  = leaks k dt / 2                                 leaks >= 1: what the sampled spring generates, and more where
+                                                           swings do not die away (a delay, a slow actuator)
+    brake = 2 ratio sqrt(k m), at most m / (2 dt)          while the contact swings by itself
+
+A *swing* runs from one turn of the position to the next. Its half period h tells the mass, m = k (h / pi)^2, and
+whether it is the contact's own or a hand's: no hand turns within 45 ms. Nothing about the device is given. One
+decision is made a swing, none between. docs/controllers.md has the reasons and the evidence.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+from hapticd.law import Field, LawParams
+
+PI = 3.141592653589793
+LIMIT = 1e12  # a quotient that is kept grows no further, in SI units
+
+TURN_COUNTS = 1.6  # a way back by one count is the flicker of the quantiser, by two it is not
+TURN_NOISES = 3.0  # in mean changes of the move from tick to tick: noise rarely goes 3 of them one way
+NOISE_SHARE = 0.02  # of a new change in that mean: it follows within 50 ticks, longer than most half periods
+LOUD = 2.0  # in turn thresholds: a shorter swing says little about mass or need
+PART = 1.43  # a swing cut by the surface is 0.5 to 1 half period long
+BOUNCE = 0.5  # a whole bounce without a turn that is seen goes in and out: two such parts
+EVEN = 0.3  # half periods within three tenths are equal; quantised turns are blurred by as much
+EVEN_TICKS = 1.5  # and never known better than to a tick at each end
+SHRINKS = 0.95  # a swing below this share of the one two before (same direction) dies away by itself
+MANY = 4.0  # cut swings without a pause: a device that bounces slowly, and not a hand that taps
+OWN = 2.5  # a swing that would need more than this many times the known mass is driven from outside
+LEARN = 0.3  # of a new mass: three swings tell another hand
+FORGET = 1.05  # growth of the mass at each quick swing that it does not explain, until it does
+SILENCE = 2.0  # in half periods: one until the next turn, and up to one until that is noticed
+FLIGHT_S = 0.09  # a bounce is over sooner; a hand that taps is not back yet (about 10 Hz at most)
+STRONGER = 4.0  # the brake, for each swing that does not shrink: from least to full in five
+PATIENCE = 2.0  # full swings that do not shrink before the brake is halved instead: too much damping rings as well
+FIRM = 3.0  # a ring with more such swings brings the first brake of the next one back, BACK times
+BACK = 8.0
+RELAX = 0.7  # of the first brake, after each ring that died away without more than that
+MOST_OF_MASS = 0.5  # brake in m/dt: a sampled damper is unstable by itself from 2, and 0.83 with one late sample
+BASE_OF_MASS = 0.45  # the same for the base, which also has to suit two late samples (0.54)
+GROWTH = 1.15  # of the base a swing; slow enough that the last step is no more than a sixth too much
+ARRIVAL = 6.0  # swings of a contact before its base may grow: an arrival has died away by then
+SLOWER = 0.9  # of the base, for each swing of a hand: this wall is being used and does not ring
+LEFT = 0.5  # of the base, for each time the device has left for good
+MOST_LEAKS = 1e3
+INHERITED = 4.0  # leaks taken over from the law before, at most: what holds every wall without delay
+
+
+class Params(LawParams):
+    """The few choices that are a matter of taste."""
+
+    hand_half_period_s: float = Field(
+        0.045, gt=0.0, le=10.0, description="a swing longer than this may be the hand's and is not braked [s]"
+    )
+    brake_ratio: float = Field(0.6, ge=0.0, le=2.0, description="damping ratio of the full brake; 0: none")
+    least_brake_ratio: float = Field(
+        0.002,
+        ge=0.0,
+        le=2.0,
+        description="what the first brake of a ring relaxes to while rings die away by themselves: high settles "
+        "sooner, low leaves taps and presses as they are",
+    )
+    pull_after: int = Field(
+        2, ge=0, le=1000, description="swings that did not shrink before damping may pull the device back; 0: always"
+    )
+
+
+class State:
+    """What is remembered of one wall: the swing that runs, the last two, and what has been learned."""
+
+    damping_n_s_per_m: float  # base and brake now; outside the wall the base
+    base_n_s_per_m: float  # learned: what stays between rings
+    felt_mass_kg: float  # learned: what the wall swings; 0 while unknown
+    leaks: float  # base in k dt / 2; 0 until the first contact
+    first_brake: float  # learned: damping ratio that a ring starts with
+    brake: float  # damping ratio now; 0: off
+    swings: float  # own swings of this ring
+    stubborn: float  # those among them that were loud and did not shrink
+    age: float  # own swings since the device came
+    noise_m: float  # mean change of the move from tick to tick
+    last_moved_m: float
+    was_in_contact: bool
+    outward: bool  # direction of the swing that runs
+    whole: bool  # whether it began with a turn, and not at the surface
+    from_m: float  # where it began
+    far_m: float  # how far it has come
+    far_s: float  # when, from its beginning
+    swing_s: float  # time since its beginning
+    last_s: float  # half period of the last swing; 0: none since the device came
+    last_m: float  # its length
+    older_m: float  # that of the one before
+    last_whole: bool
+
+
+def start(state: Any, params: Any, snapshot: Any) -> None:
+    """Take over: the damping of the law before is a base to begin with, never a brake."""
+    state.base_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
+    state.damping_n_s_per_m = state.base_n_s_per_m
+    state.felt_mass_kg = 0.0
+    state.leaks = 0.0
+    state.first_brake = params.brake_ratio
+    state.brake = 0.0
+    state.swings = 0.0
+    state.stubborn = 0.0
+    state.age = 0.0
+    state.noise_m = 0.0
+    state.last_moved_m = 0.0
+    state.was_in_contact = snapshot.x_m < 0.0
+    _begin(state, min(0.0, snapshot.x_m), snapshot.velocity_m_per_s > 0.0, False)
+    state.last_s = 0.0
+    state.last_m = 0.0
+    state.older_m = 0.0
+    state.last_whole = False
+
+
+def step(state: Any, params: Any, tick: Any) -> float:
+    """The contact's own force, less base and brake.  -> force on the device [N]."""
+    turn_m = _turn_threshold(state, tick)
+    state.swing_s += tick.dt_s
+    stiffness = 0.0
+    if tick.in_contact:
+        stiffness = tick.spring_n / -tick.x_m
+        if stiffness > LIMIT:
+            stiffness = LIMIT
+        elif stiffness < 0.0:
+            stiffness = 0.0
+        if state.leaks == 0.0:
+            _inherit(state, stiffness, tick.dt_s)
+        if not state.was_in_contact:
+            _begin(state, 0.0, False, False)
+        _follow(state, params, tick, turn_m, stiffness)
+    elif state.was_in_contact:
+        _leave(state, params, tick, turn_m)
+    state.was_in_contact = tick.in_contact
+    _listen(state, params, tick.in_contact)
+    if not tick.in_contact:
+        return 0.0
+    _set_damping(state, stiffness, tick.dt_s)
+    force_n: float = tick.contact_n - state.damping_n_s_per_m * tick.velocity_m_per_s  # eq. 9
+    if force_n < 0.0 and state.stubborn < params.pull_after:
+        force_n = max(force_n, min(0.0, tick.contact_n))  # a wall does not hold on to who leaves
+    return force_n
+
+
+# From positions to swings
+
+
+def _turn_threshold(state: Any, tick: Any) -> float:
+    """How far the way back must go to be one: beyond counts, and beyond noise.
+
+    Noise changes the move from tick to tick, a swing hardly: its change is (pi dt / h)^2 of its length.
+    """
+    change_m = abs(tick.moved_m - state.last_moved_m)
+    state.last_moved_m = tick.moved_m
+    state.noise_m += NOISE_SHARE * (change_m - state.noise_m)
+    counts_m: float = TURN_COUNTS * tick.resolution_m
+    noise_m: float = TURN_NOISES * state.noise_m
+    return counts_m if counts_m > noise_m else noise_m
+
+
+def _begin(state: Any, from_m: float, outward: bool, whole: bool) -> None:
+    """A swing begins now."""
+    state.from_m = from_m
+    state.far_m = from_m
+    state.far_s = 0.0
+    state.swing_s = 0.0
+    state.outward = outward
+    state.whole = whole
+
+
+def _follow(state: Any, params: Any, tick: Any, turn_m: float, stiffness: float) -> None:
+    """Inside: the swing goes on, or has turned where it had come farthest."""
+    x_m = tick.x_m
+    ahead_m = x_m - state.far_m if state.outward else state.far_m - x_m
+    if ahead_m > 0.0:
+        state.far_m = x_m
+        state.far_s = state.swing_s
+    elif -ahead_m > turn_m:
+        since_s = state.swing_s - state.far_s
+        half_s = state.far_s if state.whole else PART * state.far_s
+        _end(state, params, half_s, abs(state.far_m - state.from_m), state.whole, turn_m, stiffness, tick.dt_s)
+        _begin(state, state.far_m, not state.outward, True)
+        state.swing_s = since_s
+        state.far_m = x_m
+        state.far_s = since_s
+
+
+def _leave(state: Any, params: Any, tick: Any, turn_m: float) -> None:
+    """The surface ends the swing; the stiffness is out of sight, so that no mass comes of it."""
+    if state.outward:
+        _end(state, params, PART * state.swing_s, abs(state.from_m), False, turn_m, 0.0, tick.dt_s)
+    else:
+        _end(state, params, BOUNCE * PART * state.swing_s, abs(state.far_m), False, turn_m, 0.0, tick.dt_s)
+    state.swing_s = 0.0
+
+
+# What a swing says
+
+
+def _end(
+    state: Any,
+    params: Any,
+    half_s: float,
+    length_m: float,
+    whole: bool,
+    turn_m: float,
+    stiffness: float,
+    dt_s: float,
+) -> None:
+    """A swing has ended: whose was it, does the contact need more base, does it need a brake?"""
+    half_s *= sqrt(max(0.0, 1.0 - state.brake * state.brake))  # a braked swing takes longer than a free one
+    even = abs(half_s - state.last_s) <= max(EVEN_TICKS * dt_s, EVEN * half_s)
+    shrinks = length_m < SHRINKS * state.older_m
+    loud = length_m > LOUD * turn_m
+    quick = half_s <= params.hand_half_period_s
+    mass_kg = _bounded(stiffness * (half_s / PI) * (half_s / PI))
+    own = quick and (state.felt_mass_kg == 0.0 or mass_kg <= OWN * state.felt_mass_kg)
+    own = own or (state.felt_mass_kg == 0.0 and not whole and state.swings >= MANY)  # it bounces, slowly
+
+    if (quick or own) and loud and mass_kg > 0.0:
+        _feel(state, mass_kg, own, whole)
+    if own:
+        alike = even and whole and state.last_whole
+        bounces = not whole and state.swings >= 2.0 and length_m > turn_m
+        state.age += 1.0
+        if not shrinks and (alike or bounces) and state.age > ARRIVAL:
+            state.leaks = min(MOST_LEAKS, GROWTH * state.leaks)
+        if loud:
+            if state.swings >= 2.0 and not shrinks:
+                state.stubborn += 1.0
+            _brake(state, params)
+        else:
+            state.brake = 0.0
+        state.swings += 1.0
+    elif not quick:
+        state.leaks = max(1.0, SLOWER * state.leaks)
+        state.brake = 0.0
+        if state.felt_mass_kg == 0.0 and not whole:
+            state.swings += 1.0
+    state.older_m = state.last_m
+    state.last_s = half_s
+    state.last_m = length_m
+    state.last_whole = whole
+
+
+def _feel(state: Any, mass_kg: float, own: bool, whole: bool) -> None:
+    """The mass, k (h / pi)^2; a swing that the surface has cut tells it roughly, which is for a beginning only."""
+    if state.felt_mass_kg == 0.0:
+        state.felt_mass_kg = mass_kg
+    elif whole and own:
+        state.felt_mass_kg += LEARN * (min(mass_kg, 2.0 * state.felt_mass_kg) - state.felt_mass_kg)
+    elif whole:
+        state.felt_mass_kg = _bounded(FORGET * state.felt_mass_kg)
+
+
+def _brake(state: Any, params: Any) -> None:
+    """From the first brake up, once for each stubborn swing, to the full one; what that does not stop, less may."""
+    ratio = state.first_brake
+    used = 0.0
+    while used < state.stubborn and ratio < params.brake_ratio:
+        ratio *= STRONGER
+        used += 1.0
+    ratio = min(ratio, params.brake_ratio)
+    used += PATIENCE
+    while used < state.stubborn and ratio > params.least_brake_ratio:
+        ratio *= 0.5
+        used += 1.0
+    if ratio <= params.least_brake_ratio:
+        state.stubborn = 0.0  # nothing helped: from the beginning
+    state.brake = ratio
+
+
+def _listen(state: Any, params: Any, in_contact: bool) -> None:
+    """Silence ends the ring, and with it the brake; the next ring begins with less if this one was harmless."""
+    if state.swing_s <= SILENCE * state.last_s or state.last_s == 0.0:
+        return
+    if in_contact:
+        if state.brake == 0.0 and state.swings == 0.0:
+            return
+    elif state.swing_s <= FLIGHT_S:
+        return
+    state.brake = 0.0
+    if state.swings > 0.0 and state.stubborn == 0.0:
+        state.first_brake = max(min(params.least_brake_ratio, params.brake_ratio), RELAX * state.first_brake)
+    elif state.stubborn > FIRM:
+        state.first_brake = min(params.brake_ratio, BACK * state.first_brake)
+    state.swings = 0.0
+    state.stubborn = 0.0
+    if not in_contact:
+        state.leaks = max(1.0, LEFT * state.leaks)
+        state.last_s = 0.0
+        state.age = 0.0
+        state.damping_n_s_per_m = state.base_n_s_per_m
+
+
+# From what is known to damping
+
+
+def _inherit(state: Any, stiffness: float, dt_s: float) -> None:
+    """The first contact: damping of the law before in leaks of this wall."""
+    leak = 0.5 * stiffness * dt_s
+    state.leaks = 1.0
+    if leak > 0.0:
+        state.leaks = max(1.0, min(INHERITED, state.base_n_s_per_m / leak))
+
+
+def _set_damping(state: Any, stiffness: float, dt_s: float) -> None:
+    """Base and brake at the stiffness of now, so that both soften with the wall."""
+    leak = 0.5 * stiffness * dt_s
+    base = leak * state.leaks
+    mass_kg = state.felt_mass_kg
+    if state.leaks > 1.0 and mass_kg > 0.0:
+        base = max(leak, min(base, BASE_OF_MASS * mass_kg / dt_s))
+    state.base_n_s_per_m = base
+    if state.brake > 0.0:
+        brake = min(2.0 * state.brake * sqrt(stiffness * mass_kg), MOST_OF_MASS * mass_kg / dt_s)
+        state.damping_n_s_per_m = _bounded(base + brake)
+    else:
+        state.damping_n_s_per_m = base
+
+
+def _bounded(value: float) -> float:
+    if -LIMIT < value < LIMIT:
+        return value
+    return LIMIT if value > 0.0 else -LIMIT
