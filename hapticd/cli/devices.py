@@ -47,10 +47,11 @@ def devices(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array, an object a driver.")] = False,
 ) -> None:
-    """List the devices that the installed drivers, and the one that the configuration names, find.
+    """List the devices that the installed drivers find.
 
-    One that cannot be used is listed with the reason and with what mends it. No device is moved; some have to be
-    opened for a moment, so one that the daemon has shows as held. With NAME, the options of that driver follow.
+    Also those of a driver that the configuration names by its module. One that cannot be used is listed with the reason
+    and with what mends it. No device is moved; some have to be opened for a moment, so one that the daemon has shows as
+    held. With NAME, the options of that driver follow.
 
     Example: hapticd devices omega7
     """

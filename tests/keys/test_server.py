@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shlex
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -170,7 +171,9 @@ def test_a_stranger_is_told_of_once_with_the_command_that_lists_it(caplog: pytes
             endpoints.turn_until(stranger.turned_away, "a refusal")
     (line,) = caplog.messages
     assert "refused 127.0.0.1" in line
-    assert line.endswith(f"hapticd keys add NAME '{STRANGER.public}'")
+    assert line.endswith(f"hapticd keys add NAME {shlex.quote(STRANGER.public)}"), (
+        "ready for a shell, whatever is in it"
+    )
 
 
 def test_a_port_that_is_taken_is_named_and_nothing_is_left_behind() -> None:
