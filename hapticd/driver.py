@@ -198,7 +198,7 @@ class Driver(ABC, Generic[OptionsT]):
         """Have a calibration that is under way, in another thread, end early; returns at once and never raises."""
         if self._calibrating:
             self._called_off = True
-            with contextlib.suppress(Exception):  # whoever calibrates is told
+            with contextlib.suppress(Exception):  # who calibrates gets the error
                 self._call_off()
 
     def enable(self) -> None:

@@ -119,7 +119,7 @@ class LawTick:
 
 
 class LawSnapshot:
-    """What a law is told when it takes over.
+    """What a law starts from when it takes over.
 
     Attributes:
         x_m: position relative to the wall [m], < 0 inside.

@@ -73,8 +73,8 @@ class Conditions:
         kernel: release and build of the kernel.
         python: version of the interpreter.
         load_before, load_after: runnable tasks, mean of a minute.
-        others: processors that other programs kept busy meanwhile, 0.5 is one of them half the time.
-        stolen: processors that the host of a virtual machine gave to somebody else meanwhile.
+        others: processors that other programs kept busy, 0.5 is one of them half the time.
+        stolen: processors that the host of a virtual machine gave to others.
         rivals: other programs that were seen under real-time scheduling; a loop has to wait for them.
         seconds: how long the measurement took [s].
     """
@@ -111,7 +111,7 @@ class MachineWatch:
         self._own_s = sum(os.times()[:4])
 
     def look(self) -> None:
-        """See whether a rival has come meanwhile."""
+        """See whether a rival has come."""
         self._rivals |= rivals()
 
     def end(self) -> Conditions:

@@ -171,7 +171,7 @@ class _PythonLoop:
 
 @contextmanager
 def _burners(seconds: float) -> Iterator[None]:
-    """Two programs that compute; they end by themselves should nobody end them."""
+    """Two programs that compute; they end by themselves if they are not ended."""
     burners = [subprocess.Popen([sys.executable, "-c", _BURN, str(seconds)]) for _ in range(2)]
     try:
         yield

@@ -78,7 +78,7 @@ class RigReport:
 
 
 def measure(ticks: int, progress: Progress) -> RigReport:
-    """Measure so many ticks at 1 kHz, and as many round trips back to back.
+    """Measure `ticks` ticks at 1 kHz, and as many round trips back to back.
 
     Raises:
         HapticdError: there is no C compiler, or the driver cannot be used.

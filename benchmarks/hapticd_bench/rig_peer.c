@@ -29,7 +29,7 @@ int main(int count, char **words)
     if (rig == NULL) {
         return 1;
     }
-    /* Where that is allowed: a rig has a processor of its own, and waits for nobody on this one. */
+    /* Where that is allowed: a rig has a processor of its own, and does not wait on this one. */
     sched_setscheduler(0, SCHED_FIFO, &(struct sched_param){.sched_priority = PRIORITY});
     host_rig_description(rig)->capabilities = RIG_KNOWS_HOME;
     host_rig_description(rig)->host_silence_ms = SILENCE_MS;

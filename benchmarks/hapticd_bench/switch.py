@@ -82,11 +82,11 @@ class Switches:
 
 
 def measure(switches: int, burners: int, progress: Progress) -> Switches:
-    """Switch so many times, each time in a daemon of its own.
+    """Switch `switches` times, each time in a daemon of its own.
 
     Args:
         switches: how many.
-        burners: programs that spin on the loop's processor meanwhile.
+        burners: programs that spin on the loop's processor.
         progress: told what is done.
 
     Raises:
@@ -126,7 +126,7 @@ def _switch(burners: int) -> tuple[float, float]:
 
 
 def _ticks(daemon: RunningDaemon, client: Client, count: int | None) -> list[int]:
-    """Deadlines of so many ticks; without a count, of all until a switch and some after it [ns]."""
+    """Deadlines of `count` ticks; without a count, of all until a switch and some after it [ns]."""
     deadlines: list[int] = []
     switched_at: int | None = None
     while count is None or len(deadlines) < count:

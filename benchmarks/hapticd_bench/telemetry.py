@@ -40,7 +40,7 @@ _STROKE_S = 1.6  # one press and release of the synthetic hand
 
 @dataclass(frozen=True, slots=True)
 class PublishCost:
-    """What publishing cost with so many subscribers.
+    """What publishing cost with some subscribers.
 
     Attributes:
         subscribers: that read all topics.
@@ -153,7 +153,7 @@ def _reference_us() -> float:
 
 
 def _subscribe(endpoint: str, count: int, parent: Connection) -> None:
-    """Read with so many sockets until told how many ticks there were; say how many position ticks came."""
+    """Read with `count` sockets until it hears how many ticks there were; say how many position ticks came."""
     context = zmq.Context()
     poller = zmq.Poller()
     received: dict[zmq.Socket[bytes], int] = {}

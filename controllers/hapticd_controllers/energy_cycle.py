@@ -75,7 +75,10 @@ class Params(LawParams):
         10.0, ge=0.0, le=1e6, description="a cycle that travels less, in counts, is noise as much as motion"
     )
     small_leaks: float = Field(
-        4.0, ge=0.0, le=1e6, description="damping at most so many times what the spring leaked in a small cycle; 0: any"
+        4.0,
+        ge=0.0,
+        le=1e6,
+        description="damping at most this many times what the spring leaked in a small cycle; 0: any",
     )
     cap: Literal["felt-mass", "known-mass", "fixed", "none"] = Field(
         "felt-mass", description="bound of the damping: from the mass identified, the mass given, a number, nothing"
@@ -130,7 +133,7 @@ class State(CycleFields):
 
 
 def start(state: Any, params: Any, snapshot: Any) -> None:
-    """Take over: damping that was reached and energy that nobody dissipated count; a credit does not."""
+    """Take over: damping that was reached and energy that was not dissipated count; a credit does not."""
     state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
     state.felt_mass_kg = 0.0
     state.forces_late = params.force_delay == FORCE_DELAY_ONE_SAMPLE

@@ -26,7 +26,7 @@ LONGEST_S = 1e9
 """The longest run [s]."""
 
 _CHUNK_TICKS = 2000
-"""Ticks that are collected at once; progress is told as often."""
+"""Ticks that are collected at once; progress hears as often."""
 
 _CODES = {"cycle": "q", "in_contact": "b"}
 """Type codes of the columns that hold no floats."""
@@ -150,7 +150,7 @@ def rehearse(
         options: of its device; None: the configuration's own.
         make_device: makes the device model; None: the usual one.
         take: is given every row as it comes; the run then keeps the last half second only.
-        progress: is told now and then how many ticks are done.
+        progress: hears now and then how many ticks are done.
 
     Raises:
         ConfigError: the duration makes no sense, or the configuration is not one for a simulated device.

@@ -24,7 +24,7 @@ def simulate(
         config: a configuration, its file, or its text.
         duration_s: simulated time [s].
         take: is given every row as it comes, for runs too long to keep; the run then keeps the last half second only.
-        progress: is told now and then how many ticks are done.
+        progress: hears now and then how many ticks are done.
 
     Raises:
         ConfigError: the configuration cannot be used or is not one for a simulated device, or the duration makes no

@@ -91,7 +91,7 @@ def sweep(
         values: what to set it to.
         laws: names of laws; the configuration's own keeps its parameters, another has its defaults. None: its own only.
         duration_s: simulated time of each run [s].
-        progress: is told now and then how many runs are done.
+        progress: hears now and then how many runs are done.
 
     Raises:
         ConfigError: a value, a law or the duration cannot be used, or the device is not simulated.

@@ -19,7 +19,7 @@ _WIDTH = 130  # of tables that go into a file
 
 @contextmanager
 def measuring(total_s: float) -> Iterator[measure.Progress]:
-    """A progress bar; what is yielded advances it by so many seconds."""
+    """A progress bar; what is yielded advances it by that many seconds."""
     with progress_bar(total_s, "measuring") as tell:
         yield lambda seconds: tell(advance=seconds)
 
@@ -51,7 +51,7 @@ def quantile_cells(values: measure.Quantiles) -> list[str]:
 
 
 def print_verdicts(console: Console, bars: Sequence[measure.Bar], conditions: measure.Conditions) -> None:
-    """Print what was judged, and what the machine was like meanwhile."""
+    """Print what was judged, and what the machine was like during it."""
     print_bars(console, bars)
     for rival in conditions.rivals[:_MOST_RIVALS]:
         console.print(f"[red]another real-time program was running: {escape(rival)}[/]", soft_wrap=True)

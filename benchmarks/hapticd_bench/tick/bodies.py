@@ -23,7 +23,7 @@ from hapticd_bench.tick.memory import MemoryReader
 from hapticd_bench.tick.spawned import Spawned
 
 ROUNDS = 10
-"""Every case is measured in so many blocks, in a new random order each time, so that all see the same machine."""
+"""Every case is measured in this many blocks, in a new random order each time, so that all see the same machine."""
 
 _PIECES = ("nothing", "read", "step", "write", "record")
 

@@ -57,7 +57,7 @@ class Ticks:
         self.skipped.append(record.skipped)
 
     def from_s(self, settle_s: float) -> Ticks:
-        """The same without the first so many seconds."""
+        """The same without the first seconds."""
         limit_ns = self.deadline_ns[0] + settle_s * 1e9 if self.deadline_ns else 0.0
         first = sum(deadline_ns < limit_ns for deadline_ns in self.deadline_ns)
         return Ticks(

@@ -1,4 +1,4 @@
-/* What a tick does to the machine's memory, and nothing else: one byte of each of so many pages. */
+/* What a tick does to the machine's memory, and nothing else: one byte of each of some pages. */
 
 enum { PAGE = 4096, LINE = 64 };
 

@@ -1,7 +1,7 @@
 """A C program that reads as much memory as a tick: what the machine itself makes of that.
 
-A host that takes pages from its virtual machines holds up whoever reads many of them, in C as in Python, but hardly
-those who find all in the processor's caches.
+A host that takes pages from its virtual machines holds up a program that reads many of them, in C as in Python, hardly
+those that find all in the processor's caches.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ class Arrays(NamedTuple):
 
 
 def arrays_of(prepared: Sequence[Prepared], rows: int) -> Arrays:
-    """Every point as it is before its first tick, with room for so many rows of trace."""
+    """Every point as it is before its first tick, with room for `rows` rows of trace."""
     segments: list[dict[str, Any]] = []
     params = []
     first_epoch = 0

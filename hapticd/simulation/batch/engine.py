@@ -71,7 +71,7 @@ class Batch:
         law: the law's module.
         points: the loops.
         duration_s: simulated time [s].
-        window_s: the last so many seconds are reported on [s].
+        window_s: how much of the end is reported on [s].
         trace_every: keep one tick in this many; 0: none.
         ledger: keep the energy books; without them cycles and energies stay 0.
 

@@ -22,7 +22,7 @@ DELAYS = {0: 40, 1: 20, 2: 8, 3: 6, 4: 5, 5: 5, 8: 4, 12: 4, 20: 3, 40: 2, 70: 1
 """Samples of delay, and how often each is drawn."""
 
 LAWS = ("none", "energy-cycle", "tdpa", "energy-cycle:cap=known-mass")
-"""Laws, one a place, in turn; the last is told mass and delay."""
+"""Laws, one a place, in turn; the last knows mass and delay."""
 
 DRAWN = (
     "wall 1e-3-1e8 N/m, half of them with damping of 1e-4-1e4 N s/m; mass 1e-6-1e3 kg; viscous friction 0 or 1e-4-1e4 "

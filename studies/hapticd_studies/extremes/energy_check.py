@@ -115,7 +115,7 @@ def run_of(place: LoopCase, ticks: int, finite: bool) -> dict[str, float]:
         "slope": float(free.slope),
         "swing": float(free.swing),
         "area": float(free.area),
-        # An angle is known to so many roundings as it has radians; the doublings of the closed form add some.
+        # An angle is known to as many roundings as it has radians; the doublings of the closed form add some.
         "amplifies": 64.0 + 16.0 * turns,
     }
 
@@ -133,7 +133,7 @@ def balance(trace: Any, run: Any, books: Any) -> None:
     m = run.mass_kg
     delay = int(run.delay)
     x, v, measured = run.start_m, run.start_m_per_s, run.start_measured_m
-    written = spring = wall_j = 0.0  # before the first tick nobody pushes
+    written = spring = wall_j = 0.0  # before the first tick there is no push
     wall_work = wall_spent = wall_made = sensed = late = hand = rubbed = 0.0
     wall_turnover = wall_slips = turnover = slips = 0.0
     start_j = 0.5 * m * v * v + 0.5 * hand_k * x * x

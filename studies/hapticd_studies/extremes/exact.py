@@ -110,7 +110,7 @@ def rounding(place: LoopCase) -> float:
 def free_period(
     viscous_n_s_per_m: float, hand_stiffness_n_per_m: float, mass_kg: float, period_s: float, digits: int
 ) -> FreePeriod:
-    """One period of a device without a wall, to so many digits.
+    """One period of a device without a wall, to `digits` digits.
 
     Args:
         viscous_n_s_per_m: viscous friction [N s/m].

@@ -2,7 +2,7 @@
 
 A wall that also pulls makes the loop linear. Each unit state goes through one period of the plant's own code; the
 columns that come out are the map. Squared again and again it shows its spectral radius, whatever the period of an
-oscillation is and however slowly it grows: nobody waits for it.
+oscillation is and however slowly it grows: no run waits for it.
 """
 
 from __future__ import annotations

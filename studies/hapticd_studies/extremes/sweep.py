@@ -64,7 +64,7 @@ to each. law_break: a `Break`, where the loop is stable without its law.
 _PLACES_A_BLOCK = 1250
 _FEW = 200
 _PROMISED = (0.6, 0.35)
-"""What `energy-cycle` promises, told the mass: damping at most so many m/T, without and with delay."""
+"""What `energy-cycle` promises, told the mass: damping at most this many m/T, without and with delay."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ def blocks(address: str, job: Job, wanted: Sequence[int]) -> Iterator[tuple[int,
         wanted: numbers of the blocks.
 
     Raises:
-        ConfigError: no such address, or nobody works there.
+        ConfigError: no such address, or no worker there.
         HapticdError: the scheduler is gone, or the workers cannot do it.
     """
     _hush()

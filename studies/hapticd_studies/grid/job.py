@@ -46,7 +46,7 @@ def block_sizes(cells: int, most: int) -> tuple[int, ...]:
 
 
 def block_cells(sizes: Sequence[int], block: int) -> range:
-    """The cells of a block: every so many, so that all blocks see the same mixture and take the same time."""
+    """The cells of a block: evenly spaced, so that all blocks see the same mixture and take the same time."""
     return range(block, sum(sizes), len(sizes))
 
 

@@ -53,7 +53,7 @@ def require_memory(need_bytes: float, what: str) -> None:
         what: named in the refusal.
 
     Raises:
-        ConfigError: this machine has not so much free.
+        ConfigError: this machine has less free.
     """
     free_bytes = _free_bytes()
     if need_bytes > 0.8 * free_bytes:

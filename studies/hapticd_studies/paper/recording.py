@@ -54,7 +54,7 @@ class Recording(Run):
         return difference
 
     def cycle_ends(self, window: int) -> list[int]:
-        """Ticks of the minima that end a cycle, by a time window of so many samples on either side."""
+        """Ticks of the minima that end a cycle, by a time window of `window` samples on either side."""
         fields = {"window_energy_j": 0.0, "window_minimum_j": 0.0, "window_falls": 0, "window_rises": 0}
         state: Any = plain_object("Window", fields)
         ends = []

@@ -74,11 +74,11 @@ class Runs:
         return sum(len(asked.points) for every in self._asked.values() for asked in every)
 
     def run(self, duration_s: float, progress: Callable[[int], None]) -> None:
-        """Run all points for so long.
+        """Run all points.
 
         Args:
             duration_s: simulated time of each [s].
-            progress: is told now and then how many points have been done since it was last told.
+            progress: hears now and then how many points have been done since it was last told.
         """
         for law, every in self._asked.items():
             points = [point for asked in every for point in asked.points]

@@ -31,7 +31,7 @@ WINDOW_DEVICES: dict[str, dict[str, Any]] = {
     "lightly damped": {"viscous_n_s_per_m": 2.1, "max_force_n": 0.0},
 }
 OSCILLATES_M = 2e-4
-"""A span that nobody would call residual quantisation [m]."""
+"""A span that cannot be called residual quantisation [m]."""
 
 MODELS = {"paper-simulation": (-5.0, 3e3), "omega7": (-3.0, 12e3), "hapkit": (-1.0, 6e3)}
 """Device models that differ six times in mass, with a hand [N] and a wall [N/m] that are too much for each alone."""

@@ -75,7 +75,7 @@ def publish(evidence: Evidence, folder: Path, dots_per_inch: int, command: str, 
         folder: where to; it and its `scenarios` must exist.
         dots_per_inch: of the figures.
         command: what repeats it, for the report.
-        progress: is told.
+        progress: hears of it.
     """
     claims = judge(evidence)
     pictures: dict[str, bytes] = {}

@@ -42,7 +42,7 @@ def tick_operations(
         loaded: the configuration.
         first: the first tick that is counted.
         ticks: how many are.
-        every: one in so many.
+        every: one in this many.
     """
     run = Rehearsal(loaded).run(first + ticks * every)
     for _ in range(first):
