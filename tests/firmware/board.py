@@ -144,6 +144,10 @@ class Board:
         """Cut the wire of the encoder's channel B."""
         self._do(f"broken-wire {int(broken)}")
 
+    def misalign_encoder(self, phase_error_deg: float) -> None:
+        """Let channel B come later than a quarter of a period after channel A [deg, below 90 either way]."""
+        self._do(f"phase-error {phase_error_deg}")
+
     def press(self, button: bool) -> None:
         """Press or release the button."""
         self._do(f"button {int(button)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 
@@ -95,6 +96,44 @@ def test_the_watchdog_stops_the_motor_and_only_enable_brings_it_back(board: Boar
         assert board.state().motor_n == pytest.approx(2.0)
 
 
+FLOODS = {
+    "silence": b"",
+    "zeros": b"\0",
+    "ones": b"\1",
+    "0xff": b"\xff",
+    "short frames": b"\2\1\0",
+    "long frames": bytes(range(1, 255)),
+    "another's messages": framed(messages.ping(40_000, 1)),
+}
+"""What a line may be full of: nothing of it is a force."""
+
+
+@pytest.mark.parametrize("speed_m_per_s", [0.0, 0.4, 0.8])
+@pytest.mark.parametrize("flood", FLOODS)
+def test_the_watchdog_stops_the_motor_however_full_the_line_is_and_however_the_handle_moves(
+    board: Board, flood: str, speed_m_per_s: float
+) -> None:
+    """A processor that has a byte to take and an edge to count at every moment still looks at its watchdog."""
+    line = itertools.cycle(FLOODS[flood])
+    board.plant(mass_kg=0.01, damping_n_s_per_m=10.0)
+    board.hand(-5.0)
+    with Talk(board) as host:
+        board.run(200_000)  # to the lower end stop
+        host.greet()
+        host.state(messages.enable)
+        board.hand(10.0 * speed_m_per_s - 2.0 if speed_m_per_s else -5.0)
+        host.push(2.0)  # which takes a millisecond, and its bytes 0.2 ms of that
+        for _ in range(37):
+            host.raw(bytes(itertools.islice(line, 50)), 500.0)
+        before = board.state()
+        for _ in range(3):
+            host.raw(bytes(itertools.islice(line, 50)), 500.0)
+        after = board.state()
+        assert before.motor_n == pytest.approx(2.0)
+        assert after.motor_n == 0.0
+        assert before.velocity_m_per_s == pytest.approx(speed_m_per_s, abs=0.01)
+
+
 def test_a_thousand_ticks_of_a_millisecond_each_bring_a_state_each(board: Board) -> None:
     with Talk(board) as host:
         host.greet()
@@ -119,6 +158,36 @@ def test_no_count_is_lost_at_a_metre_a_second(board: Board) -> None:
                 assert host.poll().fault == 0
             assert board.state().position_m * newton > 0.049 * 10.0
         assert host.poll().position == [board.state().counts]
+
+
+@pytest.mark.parametrize(("phase_error_deg", "speed_m_per_s"), [(18.0, 0.8), (-18.0, 0.8), (45.0, 0.5), (-45.0, 0.5)])
+def test_with_a_phase_error_no_count_is_lost_at_a_speed_that_is_lower_by_its_share_of_a_quarter(
+    board: Board, phase_error_deg: float, speed_m_per_s: float
+) -> None:
+    """What counts is the time between two edges that come close; 45 degrees are what good encoders are allowed."""
+    board.misalign_encoder(phase_error_deg)
+    board.plant(mass_kg=0.01, damping_n_s_per_m=10.0)
+    with Talk(board) as host:
+        host.greet()
+        for newton in (10.0 * speed_m_per_s, -10.0 * speed_m_per_s, 10.0 * speed_m_per_s):
+            board.hand(newton)
+            for _ in range(240):
+                assert host.poll().fault == 0
+            assert board.state().position_m * newton > 0.049 * abs(newton)
+        assert host.poll().position == [board.state().counts]
+
+
+@pytest.mark.parametrize("phase_error_deg", [18.0, 45.0])
+def test_at_a_metre_a_second_such_an_encoder_is_a_fault_and_not_a_wrong_position(
+    board: Board, phase_error_deg: float
+) -> None:
+    board.misalign_encoder(phase_error_deg)
+    board.plant(mass_kg=0.01, damping_n_s_per_m=10.0)
+    with Talk(board) as host:
+        host.greet()
+        board.hand(10.0)
+        heard = [said for _ in range(50) for said in host.say(lambda sequence: messages.poll(sequence, 0))]
+        assert [said.fault for said in heard if isinstance(said, messages.Fault)] == [1]
 
 
 def test_counts_that_are_lost_are_a_fault_and_not_a_wrong_position(board: Board) -> None:

@@ -27,10 +27,19 @@ long handle_counts(const struct handle *handle)
     return lrint(handle->position_m * COUNTS_PER_M);
 }
 
+/* How many edges the disc has passed: those of channel A lie two counts apart, and one of B between each two of them. */
+static long edges_passed(const struct handle *handle)
+{
+    double counts = handle->position_m * COUNTS_PER_M - (double)handle->offset;
+    double before = 2.0 * floor((counts - 0.5) / 2.0) + 0.5; /* the last edge of A */
+    bool passed_b = counts >= before + 1.0 + handle->phase_error_deg / 90.0;
+    return lround(before + 0.5) + passed_b;
+}
+
 unsigned handle_channels(struct handle *handle)
 {
     static const unsigned GRAY[4] = {0, 1, 3, 2};
-    long counts = handle_counts(handle) - handle->offset;
+    long counts = edges_passed(handle);
     if (counts != handle->shown) {
         handle->shown += counts > handle->shown ? 1 : -1;
     }

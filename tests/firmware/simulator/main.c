@@ -140,6 +140,8 @@ static void obey(const char *command)
         handle.reversed = a != 0.0;
     } else if (strcmp(word, "broken-wire") == 0) {
         handle.broken_wire = a != 0.0;
+    } else if (strcmp(word, "phase-error") == 0) {
+        handle.phase_error_deg = a;
     } else if (strcmp(word, "button") == 0) {
         handle.button = a != 0.0;
     } else if (strcmp(word, "hang") == 0 && plugged()) {
