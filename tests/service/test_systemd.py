@@ -383,12 +383,13 @@ OWN_RULE = (
     ("vendor", "product", "subsystem", "name", "unit"),
     [
         ("1451", "0402", "", "", "hapticd@force-dimension.service"),
+        ("0403", "cb48", "", "", "hapticd@falcon.service"),
         ("16c0", "0486", "hidraw", "hidraw3", "hapticd@hid-rig.service"),
         ("16c0", "0483", "tty", "ttyACM0", "hapticd@left.service"),
         ("0403", "6001", "tty", "ttyUSB0", ""),
         ("046d", "c077", "hidraw", "hidraw4", ""),
     ],
-    ids=["force dimension", "teensy", "a rig with a rule of its own", "some serial adapter", "some mouse"],
+    ids=["force dimension", "falcon", "teensy", "a rig with a rule of its own", "some serial adapter", "some mouse"],
 )
 def test_udev_gives_a_haptic_device_to_the_group_and_starts_its_instance(
     machine: Machine, vendor: str, product: str, subsystem: str, name: str, unit: str

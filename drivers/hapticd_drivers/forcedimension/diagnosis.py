@@ -67,4 +67,5 @@ def _loaded(sdk: Sdk) -> Path:
     if named.is_absolute():
         return named.resolve()
     maps = Path("/proc/self/maps").read_text().splitlines()
-    return next((Path(line.split()[-1]) for line in maps if f"/{named.stem}" in line), named)
+    files = (line.split(maxsplit=5)[-1].removesuffix(" (deleted)") for line in maps if f"/{named.stem}" in line)
+    return next(map(Path, files), named)

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hapticd.device import FoundDevice
-from hapticd.errors import DeviceBusyError, DeviceNotFoundError, DriverError, PluginError
+from hapticd.errors import ConfigError, DeviceBusyError, DeviceNotFoundError, DriverError, PluginError
 from hapticd_drivers.forcedimension import presence
-from hapticd_drivers.forcedimension.models import FALCON_TYPE, MODELS
+from hapticd_drivers.forcedimension.models import MODELS
 from hapticd_drivers.forcedimension.presence import Obstacle, UsbDevice
+from hapticd_drivers.forcedimension.processors import on_every_processor
 from hapticd_drivers.forcedimension.sdk import GET_SDK, Sdk
 
 ANY = "Force Dimension device"
@@ -37,12 +38,19 @@ class OpenDevice:
     name: str
 
 
-def open_device(sdk: Sdk, serial: int | None) -> OpenDevice:
-    """Open the device with a serial number, or the first one that hapticd knows.
+def open_device(sdk: Sdk, serial: int | None, unknown: bool = False) -> OpenDevice:
+    """Open the device with a serial number, or the first one that can be used.
+
+    Args:
+        sdk: the SDK.
+        serial: its serial number; None takes any.
+        unknown: take a device of a type that hapticd does not know as well.
 
     Raises:
+        ConfigError: there is only one of a type that hapticd does not know.
         DriverError: there is none, or it cannot be opened.
     """
+    strangers = []
     others = []
     refusals: list[DriverError] = []
     for found in _each(sdk):
@@ -50,18 +58,24 @@ def open_device(sdk: Sdk, serial: int | None) -> OpenDevice:
             refusals.append(found)
         elif found.id in _in_use:
             refusals.append(DeviceBusyError(f"omega7: {found.name} {found.serial} is already open in this process"))
-        elif (serial is None or found.serial == serial) and found.type in MODELS:
+        elif serial is not None and found.serial != serial:
+            others.append(f"{found.name} {found.serial}")
+            _release(sdk, found.id)
+        elif found.type in MODELS or unknown:
             _in_use.add(found.id)
             return found
         else:
-            others.append(f"{found.name} {found.serial}")
+            strangers.append(f"{found.name} {found.serial}")
             _release(sdk, found.id)
-    if others and serial is not None and not refusals:
+    if strangers:
+        raise ConfigError(
+            f"device.options.max_force_n is not set: hapticd does not know what {', '.join(strangers)} bears; the "
+            "device's data sheet says it"
+        )
+    if others and not refusals:
         raise DeviceNotFoundError(f"omega7: no device has serial number {serial}; there is {', '.join(others)}")
     if refusals:
         raise _told(sdk, refusals[0])
-    if others:
-        raise DeviceNotFoundError(f"omega7: hapticd does not know how to use {', '.join(others)}")
     raise presence.explain().error()
 
 
@@ -98,10 +112,13 @@ def _described(sdk: Sdk, found: OpenDevice | DriverError, on_bus: list[UsbDevice
             return FoundDevice(ANY, "", where, said)
         return FoundDevice(ANY, "", where, f"{obstacle.text} ({said})", mend=obstacle.mend)
     problem = note = ""
-    if found.type not in MODELS:
-        problem = "hapticd does not know how to use it"
-    elif found.id in _in_use:
+    model = MODELS.get(found.type)
+    if found.id in _in_use:
         problem = "in use"
+    elif model is None:
+        note = "a type that hapticd does not know: set device.options.max_force_n to what its data sheet says"
+    elif not model.to_calibrate:
+        note = "without a watchdog: device.accept_no_watchdog = true, once docs/omega7.md has been read"
     elif not sdk.drdIsInitialized(found.id):
         note = "not calibrated since it was switched on: hapticd calibrate, which moves the arm"
     name = f"{found.name}, left-handed" if sdk.dhdIsLeftHanded(found.id) else found.name
@@ -118,7 +135,8 @@ def _unseen(device: UsbDevice) -> FoundDevice:
 def _each(sdk: Sdk) -> Iterator[OpenDevice | DriverError]:
     """Open each device that the SDK counts; what is not wanted is closed by the caller."""
     for index in range(max(0, sdk.dhdGetDeviceCount())):
-        device_id = sdk.drdOpenID(index)
+        with on_every_processor():
+            device_id = sdk.drdOpenID(index)
         if device_id < 0:
             yield sdk.failure("drdOpenID")
             continue
@@ -156,7 +174,5 @@ def _obstacle(sdk: Sdk, refusal: DriverError) -> Obstacle | None:
 def _name(sdk: Sdk, device_id: int, device_type: int) -> str:
     if device_type in MODELS:
         return MODELS[device_type].name
-    if device_type == FALCON_TYPE:
-        return "Novint Falcon"
     words = sdk.dhdGetSystemName(device_id) if sdk.has("dhdGetSystemName") else None
     return f"{(words or b'device').decode(errors='replace')} of type {device_type}"

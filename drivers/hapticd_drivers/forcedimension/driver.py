@@ -14,9 +14,10 @@ from hapticd.device import DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import ConfigError, DeviceFaultError, DriverStateError
 from hapticd_drivers.forcedimension import diagnosis, discovery, presence, settings
-from hapticd_drivers.forcedimension.failures import TIMEOUT, cause_of
-from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ
-from hapticd_drivers.forcedimension.options import ForceDimensionOptions
+from hapticd_drivers.forcedimension.failures import NOT_AVAILABLE, TIMEOUT, cause_of
+from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ, Model, unknown
+from hapticd_drivers.forcedimension.options import WATCHDOG_UNIT_MS, ForceDimensionOptions
+from hapticd_drivers.forcedimension.processors import on_every_processor
 from hapticd_drivers.forcedimension.prototypes import (
     SATURATED,
     STATUS_ERROR,
@@ -32,7 +33,7 @@ SETTLE_S = 0.1
 STOP_ATTEMPTS = 5
 """How often `dhdStop` is tried before forces are switched off another way."""
 
-_CACHED_SAMPLES, _SATURATED_FORCES = range(2)
+_CACHED_SAMPLES, _SATURATED_FORCES, _VELOCITY_ERRORS = range(3)
 """Places in `ForceDimension.METRICS`."""
 
 
@@ -44,6 +45,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
     METRICS = (
         Metric("cached_samples", "samples that the SDK's TimeGuard gave a second time"),
         Metric("saturated_forces", "forces that the motors could not give in full and that were scaled down", True),
+        Metric("velocity_errors", "times that the SDK could not give its velocity and said no usual reason", True),
     )
 
     def __init__(self, options: ForceDimensionOptions, period_s: float) -> None:
@@ -51,6 +53,8 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         self._sdk: Sdk | None = None
         self._id = -1
         self._left = False
+        self._to_calibrate = True
+        self._watchdog_steps: int | None = None
         self._sample = Sample(3)
         self._position = [ctypes.c_double() for _ in range(3)]
         self._velocity = [ctypes.c_double() for _ in range(3)]
@@ -90,9 +94,10 @@ class ForceDimension(Driver[ForceDimensionOptions]):
     def _open(self) -> DeviceInfo:
         options = self.options
         self._sdk = sdk = Sdk(options.library)
-        found = discovery.open_device(sdk, options.serial)
+        found = discovery.open_device(sdk, options.serial, unknown=options.max_force_n is not None)
         self._id = device = found.id
-        model = MODELS[found.type]
+        model = MODELS.get(found.type) or _asked(sdk, found, options)
+        self._to_calibrate = model.to_calibrate
         self._left = sdk.dhdIsLeftHanded(device)
         buttons = 1 if options.gripper_button else model.buttons
         self._prepare(sdk, model.wrist, model.gripper, buttons)
@@ -105,7 +110,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         if options.gripper_button and not model.gripper:
             raise ConfigError(f"device.options.gripper_button = true: a {model.name} has no gripper")
         settings.configure(sdk, device, options)
-        silence_ms = settings.set_watchdog(sdk, device, options.watchdog_ms, self.period_s)
+        self._watchdog_steps = steps = settings.watchdog_steps(sdk, device, options.watchdog_ms, self.period_s)
         return DeviceInfo(
             model=f"{model.name}, left-handed" if self._left else model.name,
             serial=str(found.serial),
@@ -115,7 +120,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
             workspace_m=model.spans_m,
             nominal_rate_hz=NOMINAL_RATE_HZ,
             safe_damping_n_s_per_m=model.safe_damping_n_s_per_m(self.period_s),
-            host_silence_ms=silence_ms,
+            host_silence_ms=steps * WATCHDOG_UNIT_MS if steps else None,
             buttons=buttons,
             has_gripper=model.gripper,
             has_orientation=model.wrist,
@@ -128,7 +133,10 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         if sdk.has("drdIsSupported") and not sdk.drdIsSupported(self._id):
             raise DriverStateError("omega7: this device cannot calibrate itself: put its pole into the pit by hand")
         try:
-            sdk.call("drdAutoInit", self._id)
+            if self._watchdog_steps is not None:  # only force commands feed it, and here hapticd sends none
+                settings.set_watchdog(sdk, self._id, 0)
+            with on_every_processor():
+                sdk.call("drdAutoInit", self._id)
             sdk.call("drdStop", True, self._id)
         finally:
             self._disable()  # drdStop(true) leaves forces on, with nothing that regulates them
@@ -141,7 +149,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
     def _enable(self) -> None:
         sdk = self._opened()
         device = self._id
-        if not sdk.drdIsInitialized(device):
+        if not self._is_calibrated():
             raise DriverStateError(
                 "omega7: the device has not been calibrated since it was switched on: clear its workspace, then "
                 "`hapticd calibrate`, which moves the arm"
@@ -152,9 +160,11 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         self._forces_seen = False
         try:
             sdk.call("dhdSetMaxForce", self.info.max_force_n, device)
-            sdk.call("dhdSetBrakes", 0, device)
+            self._where_there_is("dhdSetBrakes", 0)
+            if self._watchdog_steps is not None:
+                settings.set_watchdog(sdk, device, self._watchdog_steps)
             sdk.call("dhdEnableForce", 1, device)
-            sdk.call("dhdSetGravityCompensation", int(self.options.gravity_compensation), device)
+            self._where_there_is("dhdSetGravityCompensation", int(self.options.gravity_compensation))
             if self.options.gripper_button:
                 sdk.call("dhdEmulateButton", 1, device)
             sdk.call("dhdSetForceAndTorqueAndGripperForce", *[0.0] * 7, device)
@@ -225,11 +235,20 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         assert self._sdk is not None
         return self._sdk
 
+    def _is_calibrated(self) -> bool:
+        return not self._to_calibrate or bool(self._opened().drdIsInitialized(self._id))
+
+    def _where_there_is(self, name: str, value: int) -> None:
+        """Set what not every device has: a Falcon has neither brakes nor compensation."""
+        sdk = self._opened()
+        if getattr(sdk, name)(value, self._id) < 0 and sdk.last_error() not in NOT_AVAILABLE:
+            raise sdk.failure(name)
+
     def _prepare(self, sdk: Sdk, wrist: bool, gripper: bool, buttons: int) -> None:
         """Every call of a tick with its buffers, made once: the tick allocates nothing but the calls."""
         device = self._id
         self._sample = Sample(3)
-        self._sample.calibrated = sdk.drdIsInitialized(device)
+        self._sample.calibrated = self._is_calibrated()
         self._has_wrist = wrist
         self._button_bits = (1 << buttons) - 1
         position = [ctypes.byref(number) for number in self._position]
@@ -253,18 +272,22 @@ class ForceDimension(Driver[ForceDimensionOptions]):
             self._disable()
 
     def _no_velocity(self) -> None:
-        """The SDK has no velocity until two samples lie in its window; any other reason is an error."""
-        sdk = self._opened()
-        if sdk.last_error() != TIMEOUT:
-            raise sdk.failure("dhdGetLinearVelocity")
-        self._sample.velocity_m_per_s[:] = (0.0, 0.0, 0.0)
+        """The SDK has no velocity until two samples lie in its window; for any other reason it is none.
+
+        A velocity that is no number ends the loop where the estimator is the device's own, and disturbs no other.
+        """
+        if self._opened().last_error() == TIMEOUT:
+            self._sample.velocity_m_per_s[:] = (0.0, 0.0, 0.0)
+        else:
+            self.metrics[_VELOCITY_ERRORS] += 1.0
+            self._sample.velocity_m_per_s[:] = (math.nan, math.nan, math.nan)
 
     def _look_at_status(self) -> None:
         """Notice that the device has taken the force away by itself, and say why; without force, whether it may."""
         every = self.options.status_every_ticks
         self._until_status = every
         if self.state is not DriverState.ENABLED:
-            self._sample.calibrated = self._opened().drdIsInitialized(self._id)
+            self._sample.calibrated = self._is_calibrated()
             return
         if self._get_status() < 0:
             raise self._opened().failure("dhdGetStatus")
@@ -275,9 +298,21 @@ class ForceDimension(Driver[ForceDimensionOptions]):
             self._forces_seen = True
             return
         self._settling -= every
-        if self._forces_seen or self._settling <= 0:
-            cause = cause_of(status[STATUS_FORCE_OFF_CAUSE])
-            raise DeviceFaultError(f"omega7: the device took the force away: {cause}")
+        cause = status[STATUS_FORCE_OFF_CAUSE]
+        if self._forces_seen:
+            raise DeviceFaultError(f"omega7: the device took the force away: {cause_of(cause)}")
+        if self._settling <= 0:
+            why = f" ({cause_of(cause)})" if cause else ""
+            raise DeviceFaultError(
+                f"omega7: the device lets no forces through{why}: press the FORCE button on it, then arm again"
+            )
+
+
+def _asked(sdk: Sdk, found: discovery.OpenDevice, options: ForceDimensionOptions) -> Model:
+    """A device that is in no table, as far as the SDK and the configuration know it."""
+    assert options.max_force_n is not None  # or it would not have been opened
+    has = [sdk.has(name) and bool(getattr(sdk, name)(found.id)) for name in ("dhdHasWrist", "dhdHasGripper")]
+    return unknown(found.name, options.max_force_n, *has)
 
 
 def _nothing(*_: object) -> int:

@@ -1,4 +1,4 @@
-"""What USB shows of Force Dimension's devices, for when the SDK finds none and does not say why."""
+"""What USB shows of the devices that the SDK drives, for when the SDK finds none and does not say why."""
 
 from __future__ import annotations
 
@@ -24,9 +24,14 @@ VENDOR = 0x1451
 RULE = 'SUBSYSTEM=="usb", ATTR{idVendor}=="1451", MODE="0660", GROUP="plugdev", TAG+="uaccess"'
 """The one line of a udev rule that lets a user open the device; hapticd's own rules do the same."""
 
-PLUG_IT_IN = "plug it in, and switch its power supply on: lsusb shows 1451:..."
+FALCON = (0x0403, 0xCB48)
+"""The Novint Falcon, by vendor and product: the vendor is that of its USB chip."""
 
-_FALCON = (0x0403, 0xCB48)
+FALCON_RULE = RULE.replace(
+    'ATTR{idVendor}=="1451"', f'ATTR{{idVendor}}=="{FALCON[0]:04x}", ATTR{{idProduct}}=="{FALCON[1]:04x}"'
+)
+
+PLUG_IT_IN = "plug it in, and switch its power supply on: lsusb shows 1451:..., or 0403:cb48"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +56,23 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class UsbDevice:
-    """A device of Force Dimension as USB shows it.
+    """A device that the SDK drives, as USB shows it.
 
     Attributes:
-        product: USB product number.
+        name: what it is, for people, with its article.
+        number: vendor and product, `1451:0402`.
         where: bus and address, `001:005`.
         obstacle: what keeps this user from it; None when nothing on USB does.
     """
 
-    product: int
+    name: str
+    number: str
     where: str
     obstacle: Obstacle | None
 
 
 def look(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: Path = Path("/proc")) -> list[UsbDevice]:
-    """Every Force Dimension device on USB, and what is wrong with each; none when USB cannot be asked.
+    """Every device on USB that the SDK drives, and what is wrong with each; none when USB cannot be asked.
 
     Args:
         backend: pyusb backend; None takes libusb.
@@ -75,10 +82,14 @@ def look(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: Pat
     found = []
     with contextlib.suppress(usb.core.NoBackendError):
         for device in _on_bus(backend):
-            if device.idVendor == VENDOR:
+            name = _name(device)
+            if name:
+                number = f"{device.idVendor:04x}:{device.idProduct:04x}"
                 where = f"{device.bus or 0:03d}:{device.address or 0:03d}"
                 node = nodes / where[:3] / where[4:]
-                found.append(UsbDevice(device.idProduct, where, _obstacle(device, node, processes)))
+                found.append(
+                    UsbDevice(name, number, where, _obstacle(device, f"{name} is on USB ({number})", node, processes))
+                )
     return found
 
 
@@ -91,7 +102,7 @@ def explain(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: 
         processes: where the processes are.
     """
     try:
-        others = {(device.idVendor, device.idProduct) for device in _on_bus(backend)}
+        _on_bus(backend)
     except usb.core.NoBackendError:
         return Obstacle(
             DeviceNotFoundError,
@@ -101,21 +112,14 @@ def explain(backend: Any = None, nodes: Path = Path("/dev/bus/usb"), processes: 
     seen = look(backend, nodes, processes)
     if seen:
         return next((device.obstacle for device in seen if device.obstacle is not None), None) or unseen(seen[0])
-    if _FALCON in others:
-        return Obstacle(
-            DeviceNotFoundError,
-            "only a Novint Falcon is plugged in, which is not driven through the Force Dimension SDK",
-            (f"# {PLUG_IT_IN}",),
-        )
-    return Obstacle(DeviceNotFoundError, "no Force Dimension device is on USB", (f"# {PLUG_IT_IN}",))
+    return Obstacle(DeviceNotFoundError, "no Force Dimension device is on USB, and no Falcon", (f"# {PLUG_IT_IN}",))
 
 
 def unseen(device: UsbDevice) -> Obstacle:
     """That the SDK does not find a device which nothing on USB keeps from it."""
-    name = f"{VENDOR:04x}:{device.product:04x}, {device.where}"
     return Obstacle(
         DeviceNotFoundError,
-        f"a Force Dimension device is on USB ({name}) and may be opened, yet the SDK does not find it",
+        f"{device.name} is on USB ({device.number}, {device.where}) and may be opened, yet the SDK does not find it",
         ("# switch it off and on again; if that does not help, the SDK may be older than the device",),
     )
 
@@ -125,16 +129,23 @@ def _on_bus(backend: Any) -> Iterator[Any]:
     return found
 
 
-def _obstacle(device: Any, node: Path, processes: Path) -> Obstacle | None:
-    name = f"a Force Dimension device is on USB ({VENDOR:04x}:{device.idProduct:04x})"
+def _name(device: Any) -> str:
+    """What a device on USB is; "" when it is none that the SDK drives."""
+    if device.idVendor == VENDOR:
+        return "a Force Dimension device"
+    return "a Novint Falcon" if (device.idVendor, device.idProduct) == FALCON else ""
+
+
+def _obstacle(device: Any, name: str, node: Path, processes: Path) -> Obstacle | None:
     if not _may_open(node):
+        rule = RULE if device.idVendor == VENDOR else FALCON_RULE
         return Obstacle(
             DevicePermissionError,
             f"{name} but this user may not open {node}",
             (
                 "sudo hapticd service install",
                 "# then replug it; or only the rule, without the service:",
-                f"echo '{RULE}' | sudo tee /etc/udev/rules.d/70-force-dimension.rules && sudo udevadm control --reload",
+                f"echo '{rule}' | sudo tee /etc/udev/rules.d/70-force-dimension.rules && sudo udevadm control --reload",
             ),
         )
     holder = _holder(node, processes)

@@ -1,4 +1,4 @@
-"""What hapticd sets in the SDK and the device when it opens one: only what is asked for, and the watchdog."""
+"""What hapticd sets in the SDK and the device: only what is asked for, and the watchdog while forces are on."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def configure(sdk: Sdk, device: int, options: ForceDimensionOptions) -> None:
             sdk.call("dhdSetTimeGuard", options.time_guard_us, device)
 
 
-def set_watchdog(sdk: Sdk, device: int, wanted_ms: float | None, period_s: float) -> float | None:
-    """Set after what silence of this computer the device drops its force.
+def watchdog_steps(sdk: Sdk, device: int, wanted_ms: float | None, period_s: float) -> int | None:
+    """After what silence of this computer the device is to drop its force; nothing is set.
 
     Args:
         sdk: the SDK.
@@ -40,11 +40,11 @@ def set_watchdog(sdk: Sdk, device: int, wanted_ms: float | None, period_s: float
         period_s: time between ticks [s].
 
     Returns:
-        What the device took [ms]; None when it has no watchdog, or it is off.
+        Steps of 125 us, 0 for never; None when the device has no watchdog.
 
     Raises:
         ConfigError: it would act between two ticks.
-        DriverError: the device has one, and refuses.
+        DriverError: the device has one, and does not say how it is set.
     """
     period_ms = 1e3 * period_s
     if wanted_ms is None:
@@ -55,17 +55,31 @@ def set_watchdog(sdk: Sdk, device: int, wanted_ms: float | None, period_s: float
         )
     if not (sdk.has("dhdSetWatchdog") and sdk.has("dhdGetWatchdog")) or _firmware(sdk, device) < _OLDEST_WITH_WATCHDOG:
         return None
-    steps = math.ceil(wanted_ms / WATCHDOG_UNIT_MS - 1e-9)
-    taken = ctypes.c_ubyte(0)
     with sdk.expert():
-        if sdk.dhdSetWatchdog(steps, device) < 0:
+        if sdk.dhdGetWatchdog(ctypes.byref(ctypes.c_ubyte(0)), device) < 0:
             if sdk.last_error() in NOT_AVAILABLE:
                 return None
-            raise sdk.failure("dhdSetWatchdog")
+            raise sdk.failure("dhdGetWatchdog")
+    return math.ceil(wanted_ms / WATCHDOG_UNIT_MS - 1e-9)
+
+
+def set_watchdog(sdk: Sdk, device: int, steps: int) -> None:
+    """Set the device's watchdog, which only force commands feed.
+
+    Args:
+        sdk: the SDK.
+        device: the device's ID; it has a watchdog.
+        steps: of 125 us; 0 switches it off.
+
+    Raises:
+        DriverError: the device refuses, or has taken another time.
+    """
+    taken = ctypes.c_ubyte(0)
+    with sdk.expert():
+        sdk.call("dhdSetWatchdog", steps, device)
         sdk.call("dhdGetWatchdog", ctypes.byref(taken), device)
     if taken.value != steps:
         raise DeviceFaultError(f"omega7: the device took {taken.value} for a watchdog of {steps} steps of 125 us")
-    return steps * WATCHDOG_UNIT_MS if steps else None
 
 
 def _firmware(sdk: Sdk, device: int) -> float:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
 from typing import Any
 
 import pytest
 
+from hapticd.config.loading import parse
 from hapticd.driver import DriverState
 from hapticd.errors import (
     ConfigError,
@@ -18,8 +20,19 @@ from hapticd.errors import (
     DriverStateError,
 )
 from hapticd.plugins import driver as installed
+from hapticd.tick.assemble import make_tick
+from hapticd.tick.event import EventCode
 from hapticd_drivers.forcedimension.driver import STOP_ATTEMPTS, ForceDimension
-from tests.drivers.forcedimension.bench import BRAKE, FORCE, IDLE, LEFT, RIGHT, Bench
+from tests.drivers.forcedimension.bench import BRAKE, FORCE, IDLE, LEFT, RIGHT, WATCHDOG, Bench
+
+VELOCITY = """
+[device]
+driver = "omega7"
+[velocity]
+estimator = "{estimator}"
+[[scene.walls]]
+stiffness_n_per_m = 2000.0
+"""
 
 
 def test_it_is_installed_as_omega7() -> None:
@@ -35,6 +48,10 @@ def test_forces_are_enabled_in_the_order_known_to_work_and_the_first_is_zero(ben
         "drdIsInitialized",
         "dhdSetMaxForce",
         "dhdSetBrakes",
+        "dhdEnableExpertMode",
+        "dhdSetWatchdog",
+        "dhdGetWatchdog",
+        "dhdDisableExpertMode",
         "dhdEnableForce",
         "dhdSetGravityCompensation",
         "dhdEmulateButton",
@@ -65,10 +82,10 @@ def test_opening_leaves_alone_what_nobody_asked_for(bench: Bench) -> None:
     driver = bench.driver()
     info = driver.open()
     asked = {name for name in bench.log() if "Set" in name or "Config" in name or "Enable" in name}
-    assert asked == {"dhdEnableExpertMode", "dhdSetWatchdog"}
+    assert asked == {"dhdEnableExpertMode"}
     assert not bench.expert()
     assert info.host_silence_ms == 10.0
-    assert bench.get("watchdog") == 80
+    assert bench.get("watchdog") == 0
     assert bench.get("mode") == IDLE
     assert bench.get("moves") == 0
     driver.close()
@@ -143,7 +160,9 @@ def test_nothing_moves_the_arm_but_calibrate(bench: Bench) -> None:
     assert bench.get("moves") == 0
     bench.clear_log()
     driver.calibrate()
-    assert bench.log() == ["drdIsSupported", "drdAutoInit", "drdStop", "dhdStop", "drdIsInitialized"]
+    watchdog = ["dhdEnableExpertMode", "dhdSetWatchdog", "dhdGetWatchdog", "dhdDisableExpertMode"]
+    moving = ["drdAutoInit", "drdStop", "dhdStop", "drdIsInitialized"]
+    assert bench.log() == ["drdIsSupported", *watchdog, *moving]
     assert (bench.get("moves"), bench.get("mode"), bench.get("regulating")) == (1, BRAKE, 0)
     driver.enable()
     assert driver.read().calibrated
@@ -295,17 +314,107 @@ def test_the_error_is_the_one_of_the_thread_that_failed(bench: Bench) -> None:
 def test_a_device_that_never_takes_forces_is_a_fault_but_one_that_is_slow_to_say_so_is_not(bench: Bench) -> None:
     driver = bench.driver()
 
-    def read_on() -> None:
+    def go_on() -> None:
         for _ in range(300):
             driver.read()
+            driver.write([0.0, 0.0, 0.0])
 
     bench.set(status_lag=5)
     driver.open()
     driver.enable()
-    read_on()
+    go_on()
     driver.disable()
     bench.set(status_lag=1000)
     driver.enable()
-    with pytest.raises(DeviceFaultError, match="the device gives no cause"):
-        read_on()
+    with pytest.raises(DeviceFaultError, match="lets no forces through: press the FORCE button on it, then arm again"):
+        go_on()
+    driver.close()
+
+
+def test_with_its_force_button_off_the_device_says_which_button_to_press(bench: Bench) -> None:
+    """No call fails while that button is off: only the status shows that forces never come on."""
+    bench.set(button_off=1)
+    driver = bench.driver()
+    driver.open()
+    driver.enable()
+
+    def go_on() -> None:
+        for _ in range(300):
+            driver.read()
+            driver.write([0.0, 0.0, 1.0])
+
+    with pytest.raises(DeviceFaultError, match="press the FORCE button on it"):
+        go_on()
+    driver.disable()
+    bench.press_force_button()
+    driver.enable()
+    go_on()
+    assert bench.vector("force_n") == [0.0, 0.0, 1.0]
+    driver.close()
+
+
+def test_a_calibration_runs_without_the_watchdog_which_only_force_commands_feed(bench: Bench) -> None:
+    bench.set(calibrated=0, auto_init_us=60_000)
+    driver = bench.driver(watchdog_ms=10.0)
+    driver.open()
+    driver.calibrate()
+    assert driver.read().calibrated
+    driver.enable()
+    assert bench.get("watchdog") == 80
+    driver.close()
+    bench.set(calibrated=0)
+    again = bench.driver()  # a device whose watchdog is still set from before
+    again.open()
+    again.calibrate()
+    again.close()
+
+
+def test_reading_alone_does_not_feed_the_watchdog(bench: Bench) -> None:
+    driver = bench.driver(status_every_ticks=1000)
+    driver.open()
+    driver.enable()
+    driver.read()
+    driver.write([0.0, 0.0, 1.0])
+    for _ in range(12):
+        driver.read()
+    assert (bench.get("mode"), bench.get("cause")) == (BRAKE, WATCHDOG)
+    driver.close()
+
+
+def test_threads_of_the_sdk_are_not_bound_to_the_loops_processor(bench: Bench) -> None:
+    everywhere = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(everywhere)})
+    try:
+        driver = bench.driver()
+        driver.open()
+        assert bench.get("processors") == len(everywhere)
+        bench.set(calibrated=0, processors=0)
+        driver.calibrate()
+        assert bench.get("processors") == len(everywhere)
+        assert os.sched_getaffinity(0) == {min(everywhere)}
+        driver.close()
+    finally:
+        os.sched_setaffinity(0, everywhere)
+
+
+def test_a_velocity_that_the_sdk_cannot_give_matters_only_to_the_estimator_that_uses_it(bench: Bench) -> None:
+    driver = bench.driver()
+    info = driver.open()
+    ticks = {
+        estimator: make_tick(parse(VELOCITY.format(estimator=estimator), "test"), info)
+        for estimator in ("difference", "device")
+    }
+    for _ in range(5):
+        sample = driver.read()
+    for tick in ticks.values():
+        tick.start(sample)
+        tick.step(sample, 1e-3)
+        assert tick.fault == 0
+    bench.set(velocity_fails=8)
+    sample = driver.read()
+    assert driver.metrics[2] == 1.0
+    ticks["difference"].step(sample, 1e-3)
+    ticks["device"].step(sample, 1e-3)
+    assert ticks["difference"].fault == 0
+    assert ticks["device"].fault == EventCode.SAMPLE_IMPOSSIBLE
     driver.close()

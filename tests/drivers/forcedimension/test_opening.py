@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hapticd.driver import DriverState
-from hapticd.errors import ConfigError, DeviceBusyError, DeviceNotFoundError, PluginError
+from hapticd.errors import ConfigError, DeviceBusyError, DeviceNotFoundError, DriverStateError, PluginError
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from hapticd_drivers.forcedimension.models import MODELS
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, RIGHT, Bench
@@ -39,20 +39,67 @@ def test_a_device_is_picked_by_its_serial_number_and_the_others_are_left(bench: 
 
 def test_the_first_device_that_can_be_used_is_taken(bench: Bench) -> None:
     bench.set(-1, count=3)
-    bench.set(0, type=60)
+    bench.set(0, type=206)
     bench.set(1, holder=1)  # process 1 is alive
     driver = bench.driver()
     assert driver.open().serial == "1003"
     driver.close()
-    bench.set(-1, count=1)
-    with pytest.raises(DeviceNotFoundError, match="does not know how to use Novint Falcon 1001"):
-        bench.driver().open()
-    bench.set(0, type=206)
-    with pytest.raises(DeviceNotFoundError, match="does not know how to use fake haptic device of type 206 1001"):
-        bench.driver().open()
-    bench.set(-1, no_strings=1)
+
+
+@pytest.mark.parametrize("device_type", [102, 103, 110, 111, 131, 132, 203, 206, 209, 1000])
+@pytest.mark.parametrize(("wrist", "gripper"), [(0, 0), (1, 0), (1, 1)])
+def test_a_type_that_is_not_known_is_driven_once_the_user_says_what_it_bears(
+    bench: Bench, device_type: int, wrist: int, gripper: int
+) -> None:
+    bench.set(type=device_type, wrist=wrist, gripper=gripper)
     (found,) = ForceDimension.find(bench.driver().options)
-    assert (found.model, found.problem) == ("device of type 206", "hapticd does not know how to use it")
+    assert found.problem == ""
+    assert "set device.options.max_force_n" in found.note
+    with pytest.raises(ConfigError, match=rf"max_force_n is not set: .* fake haptic device of type {device_type} 1001"):
+        bench.driver().open()
+    driver = bench.driver(max_force_n=6.0)
+    info = driver.open()
+    assert info.model.removesuffix(", left-handed") == f"fake haptic device of type {device_type}"
+    assert info.max_force_n == 6.0
+    assert (info.has_orientation, info.has_gripper) == (bool(wrist), bool(gripper))
+    driver.enable()
+    driver.read()
+    driver.write([0.0, 0.0, 5.0])
+    assert bench.vector("force_n") == [0.0, 0.0, 5.0]
+    driver.close()
+
+
+def test_a_known_device_goes_before_one_that_is_not_only_where_no_force_is_named(bench: Bench) -> None:
+    bench.set(-1, count=2)
+    bench.set(0, type=206)
+    driver = bench.driver()
+    assert driver.open().serial == "1002"
+    driver.close()
+    driver = bench.driver(max_force_n=6.0)
+    assert driver.open().serial == "1001"
+    driver.close()
+    bench.set(-1, no_strings=1)
+    assert ForceDimension.find(bench.driver().options)[0].model == "device of type 206"
+
+
+def test_a_falcon_takes_forces_without_a_calibration_and_has_no_watchdog(bench: Bench) -> None:
+    bench.set(type=60, calibrated=0, motor_n=8)
+    (found,) = ForceDimension.find(bench.driver().options)
+    assert (found.model, found.problem) == ("Novint Falcon", "")
+    assert "device.accept_no_watchdog = true" in found.note
+    driver = bench.driver()
+    info = driver.open()
+    assert (info.model, info.max_force_n, info.host_silence_ms, info.buttons) == ("Novint Falcon", 8.0, None, 4)
+    assert driver.read().calibrated
+    driver.enable()
+    driver.write([0.0, 8.0, 0.0])
+    assert bench.vector("force_n") == [0.0, 8.0, 0.0]
+    driver.disable()
+    assert bench.vector("force_n") == [0.0, 0.0, 0.0]
+    with pytest.raises(DriverStateError, match="cannot calibrate itself"):
+        driver.calibrate()
+    driver.close()
+    assert bench.get("moves") == 0
 
 
 def test_a_device_of_another_process_is_busy(bench: Bench) -> None:

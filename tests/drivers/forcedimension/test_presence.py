@@ -23,6 +23,7 @@ from tests.drivers.forcedimension.bench import Bench
 
 FALCON = (0x0403, 0xCB48)
 OMEGA = (0x1451, 0x0402)
+SERIAL_ADAPTER = (0x0403, 0x6001)
 
 
 class Usb(usb.backend.IBackend):  # type: ignore[misc]  # pyusb publishes no types
@@ -95,15 +96,25 @@ def test_nothing_is_plugged_in() -> None:
     assert "plug it in" in str(error)
 
 
-def test_only_a_falcon_is_plugged_in() -> None:
-    error = presence.explain(Usb(FALCON)).error()
-    assert isinstance(error, DeviceNotFoundError)
-    assert "only a Novint Falcon" in str(error)
+@pytest.mark.usefixtures("nobody")
+def test_a_falcon_is_found_as_well_and_has_a_rule_of_its_own(nodes: Path) -> None:
+    (device,) = presence.look(Usb(SERIAL_ADAPTER, FALCON), nodes)
+    assert (device.name, device.number, device.where) == ("a Novint Falcon", "0403:cb48", "001:006")
+    error = presence.explain(Usb(FALCON), nodes).error()
+    assert isinstance(error, DevicePermissionError)
+    assert "a Novint Falcon is on USB (0403:cb48)" in str(error)
+    assert 'ATTR{idVendor}=="0403", ATTR{idProduct}=="cb48"' in str(error)
+    assert presence.RULE not in str(error)
+
+
+def test_another_thing_with_the_falcons_usb_chip_is_no_falcon() -> None:
+    assert presence.look(Usb(SERIAL_ADAPTER)) == []
+    assert "plug it in" in str(presence.explain(Usb(SERIAL_ADAPTER)).error())
 
 
 @pytest.mark.usefixtures("nobody")
 def test_this_user_may_not_open_it_and_the_rule_is_named(nodes: Path) -> None:
-    error = presence.explain(Usb(FALCON, OMEGA), nodes).error()
+    error = presence.explain(Usb(SERIAL_ADAPTER, OMEGA), nodes).error()
     assert isinstance(error, DevicePermissionError)
     assert "1451:0402" in str(error)
     assert str(nodes / "001" / "006") in str(error)
@@ -166,7 +177,7 @@ def options(library: Path) -> ForceDimensionOptions:
 
 def test_find_without_the_sdk_still_shows_what_usb_shows(on_bus: list[UsbDevice], tmp_path: Path) -> None:
     assert ForceDimension.find(options(tmp_path)) == []
-    on_bus.append(UsbDevice(0x0402, "001:005", None))
+    on_bus.append(UsbDevice("a Force Dimension device", "1451:0402", "001:005", None))
     (found,) = ForceDimension.find(options(tmp_path))
     assert found.where == "001:005"
     assert "SDK cannot be loaded" in found.problem
@@ -175,8 +186,15 @@ def test_find_without_the_sdk_still_shows_what_usb_shows(on_bus: list[UsbDevice]
 def test_find_without_a_device(on_bus: list[UsbDevice], bench: Bench) -> None:
     bench.set(-1, count=0)
     assert ForceDimension.find(options(bench.directory)) == []
-    on_bus.append(UsbDevice(0x0402, "001:005", Obstacle(DevicePermissionError, "may not", ("sudo may",))))
-    on_bus.append(UsbDevice(0x0402, "001:006", None))
+    on_bus.append(
+        UsbDevice(
+            "a Force Dimension device",
+            "1451:0402",
+            "001:005",
+            Obstacle(DevicePermissionError, "may not", ("sudo may",)),
+        )
+    )
+    on_bus.append(UsbDevice("a Force Dimension device", "1451:0402", "001:006", None))
     assert [(found.problem, found.mend) for found in ForceDimension.find(options(bench.directory))] == [
         ("may not", ("sudo may",)),
         (
@@ -189,13 +207,23 @@ def test_find_without_a_device(on_bus: list[UsbDevice], bench: Bench) -> None:
 def test_a_device_that_is_held_is_not_put_down_to_another_one_that_this_user_may_not_open(
     on_bus: list[UsbDevice], bench: Bench
 ) -> None:
-    on_bus.append(UsbDevice(0x0402, "001:005", Obstacle(DevicePermissionError, "may not", ())))
-    on_bus.append(UsbDevice(0x0402, "001:006", None))
+    on_bus.append(
+        UsbDevice("a Force Dimension device", "1451:0402", "001:005", Obstacle(DevicePermissionError, "may not", ()))
+    )
+    on_bus.append(UsbDevice("a Force Dimension device", "1451:0402", "001:006", None))
     bench.set(0, holder=1)
     (held,) = ForceDimension.find(options(bench.directory))
     assert held.problem.startswith("another program has the device (")
     assert held.where == ""
-    on_bus.insert(1, UsbDevice(0x0402, "001:007", Obstacle(DeviceBusyError, "process 42 has it", ("kill 42",))))
+    on_bus.insert(
+        1,
+        UsbDevice(
+            "a Force Dimension device",
+            "1451:0402",
+            "001:007",
+            Obstacle(DeviceBusyError, "process 42 has it", ("kill 42",)),
+        ),
+    )
     (held,) = ForceDimension.find(options(bench.directory))
     assert held.problem.startswith("process 42 has it (")
     assert held.mend == ("kill 42",)

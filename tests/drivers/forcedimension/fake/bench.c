@@ -1,7 +1,9 @@
 /* Memory of the devices, time, the last error of each thread, and the fake_ symbols that tests hold. */
+#define _GNU_SOURCE
 #include "fake.h"
 
 #include <fcntl.h>
+#include <sched.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -104,7 +106,12 @@ double fake_get(int id, const char *name, int index) {
 /* Time passes with nobody calling: what the devices do by themselves shows at the next look. */
 void fake_advance(double us) { the_bench()->virtual_us += us; }
 
-void fake_press_force_button(int id) { trip(&the_bench()->device[id], BUTTON); }
+void fake_press_force_button(int id) {
+    struct device *d = &the_bench()->device[id];
+    if (!d->button_off)
+        trip(d, BUTTON);
+    d->button_off = 0;
+}
 
 int fake_last_error(void) { return thread_error; }
 
@@ -124,6 +131,11 @@ void log_call(const char *name) {
     if (logged_count < LOGGED)
         logged[logged_count] = name;
     logged_count++;
+}
+
+void note_processors(struct device *d) {
+    cpu_set_t allowed;
+    d->processors = sched_getaffinity(0, sizeof allowed, &allowed) ? 0 : CPU_COUNT(&allowed);
 }
 
 double monotonic_us(void) {

@@ -96,7 +96,6 @@ int sample(struct device *d) {
     if (d->stale || (d->started && d->guard_us > 0 && now_us() - d->updated_us < d->guard_us))
         return 1;
     d->started = 1;
-    heard(d);
     measure(d);
     return 0;
 }

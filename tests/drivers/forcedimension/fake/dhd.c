@@ -17,8 +17,13 @@ static bool left_handed(const struct device *d) {
     int type = (int)d->type;
     return type == 36 || type == 37 || type == 105 || type == 109 || type == 132;
 }
-static bool has_wrist(const struct device *d) { return d->type != 33 && d->type != 63 && d->type != 60; }
-static bool has_gripper(const struct device *d) { return has_wrist(d) && d->type != 34 && d->type != 36; }
+static bool has_wrist(const struct device *d) {
+    return d->wrist < 0 ? d->type != 33 && d->type != 63 && d->type != FALCON : d->wrist != 0;
+}
+static bool has_gripper(const struct device *d) {
+    return d->gripper < 0 ? has_wrist(d) && d->type != 34 && d->type != 36 : d->gripper != 0;
+}
+static bool has_watchdog(const struct device *d) { return d->has_watchdog && d->type != FALCON; }
 
 int dhdErrorGetLast(void) { return last_error(); }
 
@@ -63,6 +68,8 @@ const char *dhdGetSystemName(char ID) {
 int dhdGetSerialNumber(unsigned short *sn, char ID) { DEVICE(d); *sn = (unsigned short)d->serial; return 0; }
 int dhdGetVersion(double *ver, char ID) { DEVICE(d); *ver = d->firmware; return 0; }
 bool dhdIsLeftHanded(char ID) { CALL; struct device *d = device_of(ID); return d && left_handed(d); }
+bool dhdHasWrist(char ID) { CALL; struct device *d = device_of(ID); return d && has_wrist(d); }
+bool dhdHasGripper(char ID) { CALL; struct device *d = device_of(ID); return d && has_gripper(d); }
 
 int dhdGetStatus(int *status, char ID) {
     DEVICE(d);
@@ -100,6 +107,8 @@ int dhdGetPositionAndOrientationFrame(double *px, double *py, double *pz, double
 
 int dhdGetLinearVelocity(double *vx, double *vy, double *vz, char ID) {
     DEVICE(d);
+    if (d->velocity_fails)
+        return fail((int)d->velocity_fails);
     int newest = (int)d->updates - 1, oldest = newest;
     while (oldest > 0 && newest - oldest < UPDATES - 1 &&
            now_us() - d->history_us[(oldest - 1) % UPDATES] <= d->window_ms * 1000)
@@ -161,10 +170,10 @@ int dhdSetMaxForce(double f, char ID) { DEVICE(d); d->max_force_n = f; return 0;
 
 int dhdEnableForce(unsigned char val, char ID) {
     DEVICE(d);
-    if (val && !d->calibrated)
+    if (val && !d->calibrated && d->type != FALCON)
         return fail(NOT_READY);
     trip(d, NONE);
-    if (val) {
+    if (val && !d->button_off) { /* with the button on its front off the device takes no force, and no call says so */
         d->mode = FORCE;
         d->lag_left = d->status_lag;
         d->force_calls = 0;
@@ -175,6 +184,8 @@ int dhdEnableForce(unsigned char val, char ID) {
 
 int dhdSetBrakes(int val, char ID) {
     DEVICE(d);
+    if (d->type == FALCON)
+        return fail(NOT_AVAILABLE);
     if (d->calibrated && d->mode != FORCE)
         d->mode = val ? BRAKE : IDLE;
     return 0;
@@ -190,7 +201,14 @@ int dhdStop(char ID) {
     return 0;
 }
 
-int dhdSetGravityCompensation(int val, char ID) { DEVICE(d); d->gravity = val; return 0; }
+int dhdSetGravityCompensation(int val, char ID) {
+    DEVICE(d);
+    if (d->type == FALCON)
+        return fail(NOT_AVAILABLE);
+    d->gravity = val;
+    return 0;
+}
+
 int dhdSetEffectorMass(double mass, char ID) { DEVICE(d); d->effector_kg = mass; return 0; }
 int dhdSetDeviceAngleDeg(double angle, char ID) { DEVICE(d); d->angle_deg = angle; return 0; }
 
@@ -199,7 +217,7 @@ int dhdDisableExpertMode(void) { CALL; expert = 0; return 0; }
 
 int dhdSetWatchdog(unsigned char val, char ID) {
     EXPERT_DEVICE(d);
-    if (!d->has_watchdog)
+    if (!has_watchdog(d))
         return fail(NOT_AVAILABLE);
     d->watchdog = val;
     return 0;
@@ -207,7 +225,7 @@ int dhdSetWatchdog(unsigned char val, char ID) {
 
 int dhdGetWatchdog(unsigned char *val, char ID) {
     EXPERT_DEVICE(d);
-    if (!d->has_watchdog)
+    if (!has_watchdog(d))
         return fail(NOT_AVAILABLE);
     *val = (unsigned char)d->watchdog;
     return 0;

@@ -25,6 +25,7 @@ int drdOpenID(char ID) {
     if (!d->calibrated)
         d->mode = RESET;
     d->holder = getpid();
+    note_processors(d);
     d->started = d->updates = 0;
     open_here[(int)ID] = 1;
     heard(d);
@@ -43,30 +44,32 @@ int drdClose(char ID) {
 bool drdIsSupported(char ID) {
     log_call(__func__);
     struct device *d = device_of(ID);
-    return d && d->type != 60;
+    return d && d->type != FALCON;
 }
 
 bool drdIsInitialized(char ID) {
     log_call(__func__);
     struct device *d = device_of(ID);
-    return d && d->calibrated;
+    return d && d->calibrated && d->type != FALCON;
 }
 
-/* Moves the arm, and takes its time. */
+/* Moves the arm, takes its time, and sends no force commands: a watchdog that is on stops it half way. */
 int drdAutoInit(char ID) {
     log_call(__func__);
     struct device *d = device_of(ID);
     if (!d)
         return -1;
+    note_processors(d);
     d->moves++;
     d->mode = FORCE;
     d->regulating = 1;
+    heard(d);
     for (double left_us = d->auto_init_us; left_us > 0; left_us -= 1000) {
         nanosleep(&(struct timespec){0, left_us < 1000 ? (long)(left_us * 1e3) : 1000000}, 0);
-        if (!d->regulating) /* drdStop from another thread */
+        bench->virtual_us += 1000;
+        if (!d->regulating || settle(d) < 0 || d->mode != FORCE) /* drdStop from another thread, or the watchdog */
             return fail(TIMEOUT);
     }
-    heard(d);
     if (d->auto_init_fails)
         return fail(TIMEOUT);
     d->calibrated = d->regulating = 1;
