@@ -26,6 +26,7 @@ from hapticd_drivers.forcedimension.prototypes import (
     STATUS_WORDS,
 )
 from hapticd_drivers.forcedimension.sdk import Sdk
+from hapticd_drivers.trace import Trace
 
 SETTLE_S = 0.1
 """How long after being enabled the device may still say that forces are off: known programs wait as long [s]."""
@@ -50,6 +51,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
 
     def __init__(self, options: ForceDimensionOptions, period_s: float) -> None:
         super().__init__(options, period_s)
+        self._trace = Trace(options.trace)
         self._sdk: Sdk | None = None
         self._id = -1
         self._left = False
@@ -91,9 +93,13 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         """
         return diagnosis.diagnose(options or ForceDimensionOptions())
 
+    def trace_lines(self) -> list[str]:
+        """The last calls of the SDK, oldest first; none unless `device.options.trace` says how many."""
+        return self._trace.lines()
+
     def _open(self) -> DeviceInfo:
         options = self.options
-        self._sdk = sdk = Sdk(options.library)
+        self._sdk = sdk = Sdk(options.library, self._trace if options.trace else None)
         found = discovery.open_device(sdk, options.serial, unknown=options.max_force_n is not None)
         self._id = device = found.id
         model = MODELS.get(found.type) or _asked(sdk, found, options)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from hapticd.driver import DriverOptions
+from hapticd_drivers.trace import TraceOptions
 
 WATCHDOG_UNIT_MS = 0.125
 MOST_WATCHDOG_MS = 255 * WATCHDOG_UNIT_MS
 
 
-class ForceDimensionOptions(DriverOptions):
+class ForceDimensionOptions(TraceOptions):
     """Which device, where the SDK is, and what is set in the device."""
 
     serial: int | None = Field(

@@ -7,13 +7,14 @@ import ctypes
 import os
 import platform
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from hapticd.errors import DriverError, PluginError
 from hapticd_drivers.forcedimension.failures import failure
 from hapticd_drivers.forcedimension.prototypes import OPTIONAL, PROTOTYPES
+from hapticd_drivers.trace import Trace
 
 NAME = "libdrd.so.3"
 OLDEST = (3, 14)
@@ -34,6 +35,7 @@ class Sdk:
 
     Args:
         library: file or directory of the SDK; None looks in the environment and the usual places.
+        trace: where each call is kept, if any.
 
     Attributes:
         path: what was loaded.
@@ -43,7 +45,7 @@ class Sdk:
         PluginError: it is not there, cannot be loaded, is too old or lacks a function.
     """
 
-    def __init__(self, library: str | None = None) -> None:
+    def __init__(self, library: str | None = None, trace: Trace | None = None) -> None:
         self.path, handle = _load(library)
         for name, (result, *arguments) in PROTOTYPES.items():
             function = _function(handle, name)
@@ -54,7 +56,7 @@ class Sdk:
             if function is not None:
                 function.restype = result
                 function.argtypes = arguments
-                setattr(self, name, function)
+                setattr(self, name, function if trace is None else _traced(name, function, trace))
         self.version = self._version()
         if self.version != (0, 0, 0, 0) and self.version[:2] < OLDEST:
             raise PluginError(
@@ -163,6 +165,22 @@ def _load(library: str | None) -> tuple[str, ctypes.CDLL]:
         f"omega7: the Force Dimension SDK cannot be loaded ({'; '.join(refused)}): install it and set FDSDK, or "
         "device.options.library, to where it is (docs/omega7.md)"
     )
+
+
+def _traced(name: str, function: Any, trace: Trace) -> Callable[..., Any]:
+    """A function of the SDK whose calls are kept: arguments as they are afterwards, with what was written to them."""
+
+    def call(*arguments: Any) -> Any:
+        result = function(*arguments)
+        trace.keep(name, *map(_value, arguments), "=", result)
+        return result
+
+    return call
+
+
+def _value(argument: Any) -> Any:
+    number = getattr(argument, "_obj", argument)  # what byref() refers to
+    return list(number) if isinstance(number, ctypes.Array) else getattr(number, "value", number)
 
 
 def _function(handle: ctypes.CDLL, name: str) -> Any:

@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from hapticd.driver import DriverOptions
 from hapticd.settings import Table
 from hapticd_drivers.rig.messages import MOST_AXES
+from hapticd_drivers.trace import TraceOptions
 
 Homing = Literal["low_stop", "high_stop", "low_switch", "high_switch", "here"]
 
@@ -38,7 +38,7 @@ class AxisOptions(Table):
     )
 
 
-class RigOptions(DriverOptions):
+class RigOptions(TraceOptions):
     """What a rig is, as far as it cannot say so itself, and what a calibration may do."""
 
     axes: tuple[AxisOptions, ...] = Field((), max_length=MOST_AXES, description="one table an axis")

@@ -143,6 +143,7 @@ def _hurry(port: serial.Serial) -> tuple[str, ...]:
     except ValueError as error:
         refused = str(error)
     timer = latency_timer(port.port)
+    _flush_at_frames(timer.with_name("event_char"))
     try:
         if timer.read_text().strip() == "1":
             return ()
@@ -159,6 +160,13 @@ def _hurry(port: serial.Serial) -> tuple[str, ...]:
             f"serial-rig: the adapter at {port.port} keeps bytes back for {_shown(timer)} ms: "
             f"echo 1 | sudo tee {timer}, or the udev rule in docs/serial-rig.md",
         )
+
+
+def _flush_at_frames(event_char: Path) -> None:
+    """Have an FTDI adapter hand over what it has at each zero, which ends a frame, where this may be set."""
+    with contextlib.suppress(OSError):
+        if event_char.exists():
+            event_char.write_text("0x100")  # bit 8: there is such a byte; the lower ones: which
 
 
 def _shown(timer: Path) -> str:

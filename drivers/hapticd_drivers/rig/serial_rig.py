@@ -9,7 +9,7 @@ from pydantic import Field
 
 from hapticd.device import Diagnosis, FoundDevice
 from hapticd.errors import ConfigError, DeviceNotFoundError
-from hapticd_drivers.rig import serial_ports
+from hapticd_drivers.rig import serial_adapters, serial_ports
 from hapticd_drivers.rig.driver import RigDriver
 from hapticd_drivers.rig.link import Link
 from hapticd_drivers.rig.messages import Identity
@@ -71,7 +71,7 @@ class SerialRig(RigDriver[SerialRigOptions]):
 
     @classmethod
     def diagnose(cls, options: SerialRigOptions | None = None) -> list[Diagnosis]:
-        """Whether it is clear which of the ports is meant; opens none.
+        """Whether it is clear which of the ports is meant, and whether an adapter lacks its port; opens none.
 
         Args:
             options: those of the configuration.
@@ -80,8 +80,11 @@ class SerialRig(RigDriver[SerialRigOptions]):
         try:
             serial_ports.choose(wanted)
         except DeviceNotFoundError as error:
-            if serial_ports.usb_ports():  # else there is just no rig
-                return [Diagnosis("problem", str(error).removeprefix("serial-rig: "), (SAY_WHICH,))]
+            there = serial_ports.usb_ports()
+            lacking = serial_adapters.without_port(port.usb for port in there)
+            if there:  # else there is just no rig
+                return [Diagnosis("problem", str(error).removeprefix("serial-rig: "), (SAY_WHICH,)), *lacking]
+            return lacking
         return []
 
     def _connect(self) -> Link:

@@ -17,7 +17,7 @@ from serial.tools import list_ports
 
 from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DevicePermissionError
 from hapticd_drivers.rig import messages, serial_link, serial_ports
-from hapticd_drivers.rig.frames import FrameReader
+from hapticd_drivers.rig.frames import FrameReader, framed
 from hapticd_drivers.rig.serial_link import SerialLink
 from hapticd_drivers.rig.serial_ports import Port
 from hapticd_drivers.rig.serial_rig import SAY_WHICH, SerialRig, SerialRigOptions
@@ -191,6 +191,19 @@ def test_an_ftdi_adapters_timer_is_set_to_a_millisecond_where_that_is_allowed(
     timer.write_text("16\n")
     assert notes_of(line[1], tmp_path, monkeypatch) == ()
     assert timer.read_text() == "1"
+    assert list(timer.parent.iterdir()) == [timer]  # an adapter without the other setting
+
+
+def test_an_ftdi_adapter_hands_over_each_frame_when_it_ends(
+    line: tuple[int, Port], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its event character, which the kernel takes as 0x100 + the byte: frames end with a zero."""
+    event_char = tmp_path / Path(line[1].path).name / "event_char"
+    event_char.parent.mkdir()
+    event_char.touch()
+    (event_char.parent / "latency_timer").write_text("16\n")
+    assert notes_of(line[1], tmp_path, monkeypatch) == ()
+    assert int(event_char.read_text(), 0) == 0x100 + framed(messages.hello(0))[-1]
 
 
 def test_an_ftdi_adapters_timer_that_may_not_be_set_is_told_with_the_way_out(
