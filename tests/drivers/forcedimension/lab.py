@@ -23,7 +23,12 @@ _STILL_M = 0.05e-3
 
 
 def config(
-    bench: Bench, stiffness_n_per_m: float, law: str = "energy-cycle", rate_hz: float = 1000.0, axis: str = "z"
+    bench: Bench,
+    stiffness_n_per_m: float,
+    law: str = "energy-cycle",
+    rate_hz: float = 1000.0,
+    axis: str = "z",
+    accept_no_watchdog: bool = False,
 ) -> str:
     return f"""
         [loop]
@@ -31,6 +36,7 @@ def config(
         law_budget = 1.0
         [device]
         driver = "omega7"
+        accept_no_watchdog = {str(accept_no_watchdog).lower()}
         [device.options]
         library = "{bench.directory}"
         [[scene.walls]]
@@ -79,6 +85,7 @@ class Lab:
         rate_hz: of the loop.
         law: what stabilises the wall.
         prepare: does more to the device before the daemon sees it.
+        accept_no_watchdog: what the user has agreed to.
     """
 
     def __init__(
@@ -89,6 +96,7 @@ class Lab:
         rate_hz: float = 1000.0,
         law: str = "energy-cycle",
         prepare: Callable[[Bench], None] = lambda _: None,
+        accept_no_watchdog: bool = False,
     ) -> None:
         self.file = file
         self.stiffness_n_per_m = stiffness_n_per_m
@@ -99,7 +107,8 @@ class Lab:
         prepare(self.bench)
         os.environ["FAKE_DHD_FILE"] = str(file)
         try:
-            self.daemon = Daemon(config(self.bench, stiffness_n_per_m, law, rate_hz))
+            text = config(self.bench, stiffness_n_per_m, law, rate_hz, accept_no_watchdog=accept_no_watchdog)
+            self.daemon = Daemon(text)
         finally:
             del os.environ["FAKE_DHD_FILE"]
 

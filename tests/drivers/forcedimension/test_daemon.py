@@ -173,6 +173,25 @@ def test_sigterm_ramps_out_and_leaves_the_brakes_on(lab: Lab) -> None:
 
 
 @pytest.mark.usefixtures("bench")
+def test_a_falcon_holds_a_wall_for_a_user_who_accepts_that_it_has_no_watchdog(fake_sdk: Path, tmp_path: Path) -> None:
+    def be_a_falcon(bench: Bench) -> None:
+        bench.set(type=60, calibrated=0, motor_n=8.0)
+
+    refused = Lab(fake_sdk, tmp_path / "refused", 2000.0, prepare=be_a_falcon)
+    try:
+        assert refused.daemon.wait_exit() != 0
+        assert "accept_no_watchdog = false: Novint Falcon keeps its last force" in refused.daemon.output()
+    finally:
+        refused.__exit__()
+    with Lab(fake_sdk, tmp_path / "device", 2000.0, prepare=be_a_falcon, accept_no_watchdog=True) as lab:
+        wait_until(lambda: abs(lab.look().get("force_n", index=2) - PRESS_N) < 0.1, "the wall to carry the hand")
+        os.kill(lab.daemon.control_pid(), signal.SIGKILL)
+        assert lab.daemon.wait_exit() == 1
+        assert lab.look().vector("force_n") == [0.0, 0.0, 0.0]
+        assert lab.look().get("moves") == 0
+
+
+@pytest.mark.usefixtures("bench")
 def test_a_device_that_was_just_switched_on_says_so_and_is_no_fault_until_it_is_calibrated(
     fake_sdk: Path, tmp_path: Path
 ) -> None:

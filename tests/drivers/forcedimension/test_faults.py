@@ -92,8 +92,10 @@ def test_the_watchdog_takes_the_force_away_while_nobody_calls(bench: Bench) -> N
     driver.close()
 
 
+@pytest.mark.parametrize("device_type", [35, 60])
 @pytest.mark.parametrize("first", ["read", "write"])
-def test_an_unplugged_device_is_noticed_by_the_next_call(bench: Bench, first: str) -> None:
+def test_an_unplugged_device_is_noticed_by_the_next_call(bench: Bench, first: str, device_type: int) -> None:
+    bench.set(type=device_type)
     driver = pressing(bench)
     bench.set(present=0)
     call = driver.read if first == "read" else lambda: driver.write([0.0, 0.0, 0.0])

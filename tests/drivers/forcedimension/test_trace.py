@@ -13,7 +13,7 @@ def without_time(line: str) -> str:
 
 
 def test_each_call_is_kept_with_what_it_was_given_and_what_it_wrote(bench: Bench) -> None:
-    bench.set(position_m=[0.01, 0.02, 0.03], serial=1234)
+    bench.set(position_m=[0.01, 0.02, 0.03], resolution_m=0, serial=1234)
     driver = bench.driver(trace=1000)
     driver.open()
     bench.clear_log()
