@@ -76,6 +76,12 @@ class Lab:
         """Put devices on the bus."""
         self._usb.write_text("".join(DEVICE.format(port=port, descriptors=DESCRIPTORS) for port in ports))
 
+    def plug_falcon(self, port: int) -> None:
+        """Put a Novint Falcon on the bus, and nothing else."""
+        text = DEVICE.format(port=port, descriptors=DESCRIPTORS.replace("51140204", "030448CB"))
+        text = text.replace("idVendor=1451", "idVendor=0403").replace("idProduct=0402", "idProduct=cb48")
+        self._usb.write_text(text)
+
     def lock(self) -> None:
         """Take this user's right to the device in port 5 away, and root's right to everything."""
         rootless = ["setpriv", "--bounding-set=-dac_override,-dac_read_search"] if os.geteuid() == 0 else []
@@ -214,6 +220,23 @@ def test_a_device_that_another_program_has(lab: Lab, bench: Bench) -> None:
         assert "hapticd watch" in mend
     (device,) = lab.devices()["devices"]
     assert device["problem"] == ""
+
+
+def test_a_falcon(lab: Lab, bench: Bench) -> None:
+    bench.set(type=60, calibrated=0)
+    lab.plug_falcon(5)
+    (device,) = lab.devices()["devices"]
+    assert (device["model"], device["where"], device["problem"]) == ("Novint Falcon", "001:005", "")
+    assert "device.accept_no_watchdog = true" in device["note"]
+    assert lab.doctor("driver.needs")[1][:2] == ("ok", "the SDK finds one device")
+    ((mark, text, _),) = lab.doctor("driver.devices")
+    assert (mark, "Novint Falcon" in text) == ("ok", True)
+    bench.set(-1, count=0)
+    (device,) = lab.devices()["devices"]
+    assert "a Novint Falcon is on USB (0403:cb48, 001:005) and may be opened" in device["problem"]
+    lab.lock()
+    (device,) = lab.devices()["devices"]
+    assert 'ATTR{idVendor}=="0403", ATTR{idProduct}=="cb48"' in device["mend"][2]
 
 
 def test_two_devices(lab: Lab, bench: Bench) -> None:
