@@ -104,7 +104,10 @@ double fake_get(int id, const char *name, int index) {
 }
 
 /* Time passes with nobody calling: what the devices do by themselves shows at the next look. */
-void fake_advance(double us) { the_bench()->virtual_us += us; }
+void fake_advance(double us) {
+    the_bench();
+    pass(us);
+}
 
 void fake_press_force_button(int id) {
     struct device *d = &the_bench()->device[id];
@@ -145,6 +148,13 @@ double monotonic_us(void) {
 }
 
 double now_us(void) { return bench->virtual_us + bench->wall_scale * monotonic_us(); }
+
+double watch_us(void) { return bench->watched_us + bench->wall_scale * monotonic_us(); }
+
+void pass(double us) {
+    bench->virtual_us += us;
+    bench->watched_us += us;
+}
 
 int last_error(void) { return thread_error; }
 

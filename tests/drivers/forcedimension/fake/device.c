@@ -49,12 +49,12 @@ void trip(struct device *d, enum cause cause) {
 int settle(struct device *d) {
     if (!d->present)
         return -1;
-    if (d->mode == FORCE && d->watchdog > 0 && now_us() - d->heard_us > d->watchdog * 125)
+    if (d->mode == FORCE && d->watchdog > 0 && watch_us() - d->heard_us > d->watchdog * 125)
         trip(d, WATCHDOG);
     return 0;
 }
 
-void heard(struct device *d) { d->heard_us = now_us(); }
+void heard(struct device *d) { d->heard_us = watch_us(); }
 
 static void measure(struct device *d) {
     int at = (int)d->updates % UPDATES;
@@ -88,7 +88,10 @@ int sample(struct device *d) {
     }
     double us = passed_us(d);
     if (us > 0) {
-        bench->virtual_us += us;
+        if (bench->real_time)
+            bench->virtual_us += us;
+        else
+            pass(us);
         move(d, us * 1e-6);
     }
     if (d->frozen)

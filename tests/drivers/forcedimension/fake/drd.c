@@ -66,7 +66,7 @@ int drdAutoInit(char ID) {
     heard(d);
     for (double left_us = d->auto_init_us; left_us > 0; left_us -= 1000) {
         nanosleep(&(struct timespec){0, left_us < 1000 ? (long)(left_us * 1e3) : 1000000}, 0);
-        bench->virtual_us += 1000;
+        pass(1000);
         if (!d->regulating || settle(d) < 0 || d->mode != FORCE) /* drdStop from another thread, or the watchdog */
             return fail(TIMEOUT);
     }

@@ -36,7 +36,7 @@ enum cause { NONE, BUTTON, VELOCITY, WATCHDOG, SOFTWARE };
 /* Numbers of the bench: period of a tick, devices plugged in, what the SDK calls itself, how time passes. */
 #define BENCH_FIELDS(S, V) \
     S(period_us, 1000) S(count, 1) S(major, 3) S(minor, 17) S(no_strings, 0) \
-    S(real_time, 0) S(held, 0) S(virtual_us, 0) S(wall_scale, 0)
+    S(real_time, 0) S(held, 0) S(virtual_us, 0) S(watched_us, 0) S(wall_scale, 0)
 
 #define SCALAR(name, value) double name;
 #define VECTOR(name) double name[3];
@@ -55,7 +55,9 @@ struct bench {
 /* bench.c */
 extern struct bench *bench;
 struct bench *the_bench(void);
-double now_us(void);     /* for the electronics */
+double now_us(void);     /* for samples: their age, and their velocity */
+double watch_us(void);   /* for the watchdog: a device that moves in real time counts the wall clock by `wall_scale` alone */
+void pass(double us);    /* time that is not the wall clock's */
 double monotonic_us(void);
 void log_call(const char *name);
 int fail(int error);
