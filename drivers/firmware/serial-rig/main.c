@@ -102,7 +102,7 @@ static void send(void *board, const uint8_t *message, uint8_t length)
 
 static const struct rig_hal HAL = {micros, position, buttons, home_switch, drive, problem, forget_problem, send};
 
-/* What is due is looked at when the line is quiet, and on a line that never is, every so many bytes: 0.64 ms at 1 Mbaud.
+/* What is due is looked at when the line is quiet, and on a line that never is, every 64 bytes: 0.64 ms at 1 Mbaud.
  * At every byte it would cost more than the time between two. */
 enum { BYTES_AT_ONCE = 64 };
 

@@ -63,7 +63,7 @@ class TracedLink:
         return messages
 
     def wait(self, timeout_s: float) -> None:
-        """Return when something may have come, or after so long [s]."""
+        """Return when something may have come, or after this time [s]."""
         self._link.wait(timeout_s)
 
     def close(self) -> None:
