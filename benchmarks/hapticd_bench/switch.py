@@ -45,6 +45,9 @@ law = "{law}"
 auto_arm = true
 """
 
+PATIENCE_S = 30.0
+"""How long a daemon may be silent, while it starts beside whatever else the computer does [s]."""
+
 LAW = '''
 """A law of a lab's own: the wall with constant damping."""
 from pydantic import Field
@@ -129,9 +132,12 @@ def _ticks(daemon: RunningDaemon, client: Client, count: int | None) -> list[int
     """Deadlines of `count` ticks; without a count, of all until a switch and some after it [ns]."""
     deadlines: list[int] = []
     switched_at: int | None = None
+    heard_s = time.monotonic()
     while count is None or len(deadlines) < count:
-        records = client.receive(5.0)
-        if not records or daemon.process.poll() is not None:
+        records = client.receive(1.0)
+        if records:
+            heard_s = time.monotonic()
+        if daemon.process.poll() is not None or time.monotonic() - heard_s > PATIENCE_S:
             raise daemon.failed("no ticks any more")
         for record in records:
             if isinstance(record, Timing):
