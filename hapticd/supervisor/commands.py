@@ -15,10 +15,12 @@ import msgpack
 import zmq
 
 from hapticd.errors import InstanceError
+from hapticd.keys.connections import ConnectionBound
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
 
-_LARGEST_REQUEST = 1 << 16
+_LARGEST_REQUEST = 1024  # bytes of a frame; the handshake with keys is the longest
+_MOST_UNREAD = 100  # requests of a client, each of any number of frames
 _MOST_AT_ONCE = 50
 _LAST_WORDS_MS = 100
 
@@ -44,7 +46,9 @@ class CommandSocket:
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.setsockopt(zmq.LINGER, _LAST_WORDS_MS)
+        self._connections = ConnectionBound(self._socket)
         self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
+        self._socket.setsockopt(zmq.RCVHWM, _MOST_UNREAD)
         try:
             self._socket.bind(f"ipc://{path}")
             path.chmod(0o660)
@@ -71,11 +75,13 @@ class CommandSocket:
         requests = []
         for _ in range(_MOST_AT_ONCE):
             try:
-                identity, *frames = self._socket.recv_multipart(zmq.NOBLOCK)
+                who, *frames = self._socket.recv_multipart(zmq.NOBLOCK, copy=False)
             except zmq.Again:
                 break
-            reply = self._replier(identity)
-            request = _decoded(frames)
+            reply = self._replier(who.bytes)
+            request = _decoded([frame.bytes for frame in frames])
+            if request is not None:
+                self._connections.heard(int(frames[0].get(zmq.SRCFD)))
             if request is None:
                 reply(False, 'a request is one msgpack map with a text under "do"')
             else:
@@ -85,6 +91,7 @@ class CommandSocket:
     def close(self) -> None:
         """Let go of the path; answers under way have a moment to leave."""
         self._socket.close()
+        self._connections.close()
         if self._gate is not None:
             self._gate.close()
         self._context.term()

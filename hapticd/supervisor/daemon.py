@@ -8,6 +8,7 @@ import signal
 import time
 
 from hapticd.config.loading import LoadedConfig
+from hapticd.keys.connections import raise_descriptor_limit
 from hapticd.keys.policy import key_ring
 from hapticd.paths import CONTROL, TELEMETRY, fault_directory
 from hapticd.supervisor.child import END_TIMEOUT_S, LoopProcess, LoopStart
@@ -72,6 +73,7 @@ class Daemon:
         self._terminal = Terminal()
         offset_ns = measure_epoch_offset_ns()
         ring = key_ring(config)
+        self._few_descriptors = raise_descriptor_limit()
         with contextlib.ExitStack() as undo:
             self.lock = InstanceLock(instance)
             undo.callback(self.lock.close)
@@ -162,6 +164,8 @@ class Daemon:
                 log.warning("%s", warning)
         else:
             state.tell(EventCode.NOT_REALTIME, f"not real-time: {'; '.join(state.loop.warnings)}")
+        if self._few_descriptors:
+            log.warning("%s", self._few_descriptors)
         for note in state.loop.info.notes:
             log.warning("%s", note)
         while self.exit_code is None:

@@ -17,6 +17,7 @@ import zmq
 
 from hapticd.config.models import TelemetryConfig
 from hapticd.errors import InstanceError
+from hapticd.keys.connections import ConnectionBound
 from hapticd.keys.policy import stays_here
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
@@ -30,7 +31,8 @@ BATCH_NS = 20_000_000
 
 _MOST_SUBSCRIPTIONS_AT_ONCE = 1000
 _LAST_WORDS_MS = 100
-_LARGEST_REQUEST = 1024  # bytes of a subscription; a subscriber has nothing longer to say
+_LARGEST_REQUEST = 128  # bytes of a subscription; ZeroMQ keeps forty times that for each
+_LARGEST_WITH_KEYS = 1024  # the handshake is longer, and who it lets in is listed
 
 
 @dataclass(slots=True)
@@ -44,6 +46,7 @@ class PublisherCounts:
         messages: messages sent, received or not.
         payload_bytes: bytes of payload in them.
         refused: messages that ZeroMQ did not take, 0 unless something is wrong.
+        dropped: clients that were disconnected since they only filled the memory.
         invalid: maps in which a number was not finite.
         subscriptions: requests for a topic seen.
     """
@@ -54,6 +57,7 @@ class PublisherCounts:
     messages: int = 0
     payload_bytes: int = 0
     refused: int = 0
+    dropped: int = 0
     invalid: int = 0
     subscriptions: int = 0
 
@@ -106,6 +110,7 @@ class Publisher:
         self._gate: CurveServer | None = None
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.XPUB)
+        self._connections = ConnectionBound(self._socket)
         try:
             self._socket.setsockopt(zmq.XPUB_VERBOSE, 1)
             self._socket.setsockopt(zmq.SNDHWM, config.send_high_water)
@@ -182,13 +187,10 @@ class Publisher:
             if not int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
                 break
             try:
-                request = self._socket.recv(zmq.NOBLOCK)
+                request = self._socket.recv(zmq.NOBLOCK, copy=False)
             except zmq.Again:
                 break
-            if request[:1] == b"\x01":
-                self.counts.subscriptions += 1
-                prefix = request[1:]
-                wanted.update(topic for topic in (Topic.STATUS, Topic.INPUT) if topic.encode().startswith(prefix))
+            wanted.update(self._asked_for(request))
         if Topic.STATUS in wanted and self._status is not None:
             self._send_status()
         if Topic.INPUT in wanted and self._input_message is not None:
@@ -202,6 +204,7 @@ class Publisher:
         if not self._socket.closed:
             self._send_batch()
         self._socket.close(linger=_LAST_WORDS_MS)
+        self._connections.close()
         if self._gate is not None:
             self._gate.close()
         self._context.term()  # returns when ZeroMQ's thread has let go of the path
@@ -233,6 +236,20 @@ class Publisher:
         self._input.append(fields)
         if self._batch_due_ns is None:
             self._batch_due_ns = record.deadline_ns + BATCH_NS
+
+    def _asked_for(self, request: zmq.Frame) -> list[Topic]:
+        """The topics that a request subscribes to; a client that asks for too much else is disconnected."""
+        said = request.bytes
+        if said[:1] != b"\x01":  # the end of a subscription; a client that has gone has no connection
+            return []
+        connection = int(request.get(zmq.SRCFD))
+        self.counts.subscriptions += 1
+        topics = [topic for topic in Topic if topic.encode().startswith(said[1:])]
+        if topics:
+            self._connections.heard(connection)
+        elif self._connections.odd(connection):
+            self.counts.dropped += 1
+        return topics
 
     def _send_batch(self) -> None:
         self._batch_due_ns = None
@@ -274,6 +291,7 @@ class Publisher:
                 "telemetry.tcp to a loopback address such as tcp://127.0.0.1:9872"
             )
         try:
+            self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_WITH_KEYS)
             self._gate = CurveServer(self._socket, endpoint, ring.pair, ring.watchers())
         except zmq.ZMQError as error:
             raise _refused(endpoint, error) from error

@@ -1,0 +1,184 @@
+"""How many may be connected: a bound that ZeroMQ itself does not have.
+
+Each connection costs a descriptor, and ZeroMQ aborts the process that has none left when the next client of a local
+socket comes. ZeroMQ tells of each connection that it has taken, and takes no more while a thousand or two of those
+messages are unread, so that a thread that stands still lets nothing grow.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import resource
+import socket as sockets
+import struct
+import threading
+import time
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+import zmq
+
+MOST_CONNECTIONS = 256
+"""How many clients an endpoint has at most; beyond it those that have said nothing yet are dropped, oldest first."""
+
+DESCRIPTORS = 8192
+"""File descriptors that are enough for every endpoint at its bound and ZeroMQ's unread messages beside it."""
+
+MOST_ODD = 32
+"""What a client may say that makes no sense before it is disconnected: it may be mistaken, but not for ever."""
+
+_UNREAD = 1000
+_QUIET_S = 60.0  # between two lines in the log about the same endpoint
+_LOOK_MS = 1000
+_NEWS = zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED | zmq.EVENT_CLOSED | zmq.EVENT_MONITOR_STOPPED
+_MONITOR = "inproc://connections"
+
+log = logging.getLogger("hapticd")
+
+
+def raise_descriptor_limit() -> str:
+    """Let this process have `DESCRIPTORS` of them.
+
+    Returns:
+        What is wrong when it may not, a line for people; "" when nothing is.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if _enough(soft):
+        return ""
+    wanted = DESCRIPTORS if _enough(hard) else hard
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+        soft = wanted
+    if _enough(soft):
+        return ""
+    return (
+        f"only {soft} file descriptors, of {DESCRIPTORS}: a flood of connections could end the daemon; "
+        "raise the limit (ulimit -n, LimitNOFILE=)"
+    )
+
+
+class ConnectionBound:
+    """Bounds the connections of a socket. Make it before the socket is bound.
+
+    Args:
+        socket: that clients connect to, one of it in a ZeroMQ context.
+        most: connections of an endpoint.
+    """
+
+    def __init__(self, socket: zmq.Socket[bytes], most: int = MOST_CONNECTIONS) -> None:
+        self._most = most
+        self._endpoints: dict[str, dict[int, _Client]] = {}  # by descriptor, oldest first
+        self._lock = threading.Lock()
+        self._told_s: dict[str, float] = {}
+        self._closed = threading.Event()
+        socket.monitor(_MONITOR, _NEWS)
+        self._news: zmq.Socket[bytes] = socket.context.socket(zmq.PAIR)
+        self._news.setsockopt(zmq.RCVHWM, _UNREAD)
+        self._news.connect(_MONITOR)
+        self._thread = threading.Thread(target=self._run, name="connections", daemon=True)
+        self._thread.start()
+
+    def heard(self, descriptor: int) -> None:
+        """A client has said something that makes sense: it is not dropped for one that is newer.
+
+        Args:
+            descriptor: of its connection, as ZeroMQ tells with a message.
+        """
+        with self._lock:
+            for clients in self._endpoints.values():
+                if descriptor in clients:
+                    clients[descriptor].heard = True
+
+    def odd(self, descriptor: int) -> bool:
+        """A client has said what makes no sense; past `MOST_ODD` of it, it is disconnected.
+
+        Args:
+            descriptor: of its connection, as ZeroMQ tells with a message.
+
+        Returns:
+            Whether that was the last.
+        """
+        with self._lock:
+            for endpoint, clients in self._endpoints.items():
+                client = clients.get(descriptor)
+                if client is not None:
+                    client.odd += 1
+                    if client.odd > MOST_ODD:
+                        del clients[descriptor]
+                        _shut(descriptor, endpoint)
+                        return True
+        return False
+
+    def close(self) -> None:
+        """Look no more; after the socket is closed, and before its context ends. May be called twice."""
+        self._closed.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        # Until the socket is closed and all has been read: a thread of ZeroMQ may wait for that.
+        while self._news.poll(_LOOK_MS) or not self._closed.is_set():
+            if not self._news.poll(0):
+                continue
+            news, where = self._news.recv_multipart()
+            event, value = struct.unpack("=Hi", news)
+            if event == zmq.EVENT_MONITOR_STOPPED:
+                break
+            with self._lock:
+                self._learn(event, value, where.decode(errors="replace"))
+        self._news.close(0)
+
+    def _learn(self, event: int, descriptor: int, endpoint: str) -> None:
+        if event == zmq.EVENT_CLOSED:  # the endpoint itself, and with it all that were connected there
+            self._endpoints.pop(endpoint, None)
+            return
+        for known in self._endpoints.values():  # of a wildcard the end has another name than the beginning
+            known.pop(descriptor, None)
+        if event == zmq.EVENT_DISCONNECTED:
+            return
+        clients = self._endpoints.setdefault(endpoint, {})
+        clients[descriptor] = _Client()
+        if len(clients) > self._most:
+            victim = next(one for one, client in clients.items() if not client.heard)
+            del clients[victim]
+            _shut(victim, endpoint)
+            self._tell(endpoint)
+
+    def _tell(self, endpoint: str) -> None:
+        now_s = time.monotonic()
+        if now_s - self._told_s.get(endpoint, -_QUIET_S) >= _QUIET_S:
+            self._told_s[endpoint] = now_s
+            log.warning("%s: more than %d connections; the oldest that say nothing are dropped", endpoint, self._most)
+
+
+@dataclass(slots=True)
+class _Client:
+    heard: bool = False
+    odd: int = 0
+
+
+def _enough(limit: int) -> bool:
+    return limit == resource.RLIM_INFINITY or limit >= DESCRIPTORS
+
+
+def _shut(descriptor: int, endpoint: str) -> None:
+    """End a connection; ZeroMQ sees that and closes it.
+
+    The number may be another thing's by now, so it is held, and only what belongs to the endpoint is ended.
+    """
+    with contextlib.suppress(OSError):
+        held = os.dup(descriptor)
+        try:
+            connection = sockets.socket(fileno=held)
+            if _is_at(connection.getsockname(), endpoint):
+                connection.shutdown(sockets.SHUT_RDWR)
+            connection.detach()
+        finally:
+            os.close(held)
+
+
+def _is_at(name: object, endpoint: str) -> bool:
+    if isinstance(name, tuple):
+        return endpoint.startswith("tcp://") and name[1] == urlsplit(endpoint).port
+    return f"ipc://{name}" == endpoint
