@@ -54,15 +54,15 @@ bench: $(READY)
 install: own-place
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || .ci/packages python3-venv
 	umask 022; $(PYTHON) -m venv "$(PLACE)"
-	umask 022; "$(PLACE)/bin/python" -m pip install --quiet --disable-pip-version-check --root-user-action ignore .
+	umask 022; "$(PLACE)/bin/python" -P -m pip install --quiet --disable-pip-version-check --root-user-action ignore .
 	@# Below DESTDIR the environment must not remember where it was built.
 	@test -z "$(DESTDIR)" || { \
 		grep -rlIZ "$(PLACE)" "$(PLACE)/bin" "$(PLACE)/pyvenv.cfg" | xargs -0 -r sed -i "s|$(PLACE)|$(PREFIX)|g"; \
 		"$(PLACE)/bin/python" -m compileall -q -f -s "$(DESTDIR)" -p / "$(PLACE)/lib"; }
-	"$(PLACE)/bin/python" -m hapticd service install --root "$(DESTDIR)/"
+	"$(PLACE)/bin/python" -P -m hapticd service install --root "$(DESTDIR)/"
 
 uninstall: own-place
-	"$(PLACE)/bin/python" -m hapticd service uninstall --root "$(DESTDIR)/"
+	"$(PLACE)/bin/python" -P -m hapticd service uninstall --root "$(DESTDIR)/"
 	rm -rf "$(PLACE)"
 
 own-place:

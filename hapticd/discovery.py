@@ -64,7 +64,7 @@ def _ask(name: str, options: DriverOptions | None, find: bool, timeout_s: float)
     given = None if options is None else options.model_dump(mode="json", exclude_unset=True)
     request = json.dumps({"driver": name, "options": given, "find": find})
     process = subprocess.Popen(
-        [sys.executable, "-m", "hapticd.discovery"],
+        [sys.executable, "-P", "-m", "hapticd.discovery"],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace",
     )  # fmt: skip
     try:

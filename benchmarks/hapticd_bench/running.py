@@ -37,7 +37,7 @@ class RunningDaemon:
         self._log = directory / "log"
         with self._log.open("w") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "hapticd", "run", "--config", str(config)],
+                [sys.executable, "-P", "-m", "hapticd", "run", "--config", str(config)],
                 env=self._environment,
                 stdout=log,
                 stderr=log,
@@ -50,7 +50,7 @@ class RunningDaemon:
             HapticdError: it was refused.
         """
         done = subprocess.run(
-            [sys.executable, "-m", "hapticd", *arguments],
+            [sys.executable, "-P", "-m", "hapticd", *arguments],
             env=self._environment,
             capture_output=True,
             text=True,

@@ -31,7 +31,7 @@ def attempt(priority: int) -> Attempt:
     Raises:
         HapticdError: the child did not say.
     """
-    command = [sys.executable, "-m", "hapticd.doctor.trial", str(priority)]
+    command = [sys.executable, "-P", "-m", "hapticd.doctor.trial", str(priority)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=_TIMEOUT_S)
         return Attempt(**json.loads(done.stdout))

@@ -88,7 +88,8 @@ def measure(
         HapticdError: the child did not run.
     """
     machine = MachineWatch()
-    command = [sys.executable, "-m", "hapticd.doctor.sleeper", str(os.getpid()), loop.model_dump_json(), str(seconds)]
+    sleeper = [sys.executable, "-P", "-m", "hapticd.doctor.sleeper"]
+    command = [*sleeper, str(os.getpid()), loop.model_dump_json(), str(seconds)]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     started_s = time.monotonic()
     try:

@@ -184,7 +184,7 @@ class LoopStart:
             # In a session of its own, so that the terminal's interrupt reaches the supervisor alone.
             self._process = subprocess.Popen(
                 [
-                    *(sys.executable, "-m", "hapticd.loop.process"),
+                    *(sys.executable, "-P", "-m", "hapticd.loop.process"),
                     *("--socket", str(theirs.fileno()), "--parent", str(os.getpid())),
                 ],
                 stdin=file,

@@ -95,7 +95,7 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
         file.write(config.text.encode())
         file.seek(0)
         return subprocess.Popen(
-            [sys.executable, "-m", "hapticd.supervisor.force_release", "--config", str(file.fileno())],
+            [sys.executable, "-P", "-m", "hapticd.supervisor.force_release", "--config", str(file.fileno())],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

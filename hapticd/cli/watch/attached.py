@@ -29,7 +29,7 @@ def run_watched(config: Path, instance: str) -> int:
     Returns:
         The daemon's exit code.
     """
-    hapticd = [sys.executable, "-m", "hapticd"]
+    hapticd = [sys.executable, "-P", "-m", "hapticd"]
     # When we end in any way, as when the terminal is closed, the daemon ramps its force out and the view ends.
     with_us = partial(die_with_parent, os.getpid())
     with tempfile.TemporaryFile("w+") as log:
