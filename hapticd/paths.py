@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import stat
@@ -37,8 +38,11 @@ TELEMETRY = "telemetry"
 """Name of the telemetry socket in the runtime directory."""
 CONTROL = "control"
 """Name of the control socket beside it."""
+LOCK = "lock"
+"""Name of the file beside them that a daemon holds locked as long as it lives."""
 
 _RUN = Path("/run/hapticd")
+_WHOSE = ("system", "user")
 _INSTANCE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 
@@ -85,28 +89,67 @@ def make_runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
     return directory
 
 
-def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
-    """Where a client finds a socket of an instance: the system's daemon first, then the user's own.
+def alive(directory: Path) -> bool:
+    """Whether a daemon lives in a runtime directory: what it left behind when it was killed does not count.
 
-    When no daemon has made one yet: where this user's own daemon would make it.
+    Raises:
+        PermissionError: this user may not look.
+    """
+    try:
+        descriptor = os.open(directory / LOCK, os.O_RDONLY | os.O_CLOEXEC)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
+    """Where a client finds a socket of an instance: the system's daemon or the user's own, whichever lives.
+
+    When none does: where one was, else where this user's own would be.
+
+    Args:
+        name: of the socket.
+        instance: name of the instance; `system/NAME` or `user/NAME` says which daemon of that name.
 
     Raises:
         ConfigError: the instance's name is none that a directory could have.
-        InstanceError: the daemon's directory is not open to this user.
+        InstanceError: both live, or the daemon's directory is not open to this user.
     """
-    given = named_directory("RUNTIME", instance)
+    whose, _, plain = instance.rpartition("/")
+    if whose not in ("", *_WHOSE):
+        plain = instance  # no directory can have that name, which is said below
+    given = named_directory("RUNTIME", plain)
     if given is not None:
         return given / name
-    closed = None
-    for directory in (_RUN / instance, _user_runtime(instance)):
+    places = {"system": _RUN / plain, "user": _user_runtime(plain)}
+    if whose:
+        places = {whose: places[whose]}
+    living, there, closed = [], [], None
+    for directory in places.values():
         try:
+            if alive(directory):
+                living.append(directory)
             if (directory / name).exists():
-                return directory / name
+                there.append(directory)
         except PermissionError:
             closed = directory
-    if closed is not None:
+    if len(living) > 1:
+        raise InstanceError(
+            f"two daemons run as {plain!r}, the system's in {living[0]} and your own in {living[1]}: say which with "
+            f"--instance system/{plain} or --instance user/{plain}"
+        )
+    if not living and closed is not None:
         raise InstanceError(f"{closed}: not open to you: sudo usermod -aG hapticd $USER, then log in again")
-    return runtime_directory(instance) / name
+    found = [*living, *there]
+    if found:
+        return found[0] / name
+    return (places[whose] if whose else runtime_directory(plain)) / name
 
 
 def telemetry_endpoint(instance: str = DEFAULT_INSTANCE) -> str:

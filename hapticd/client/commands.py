@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
 import msgpack
 import zmq
 
-from hapticd.errors import HapticdError, InstanceError
+from hapticd.errors import HapticdError, InstanceError, SilenceError
 from hapticd.keys.client import ENVIRONMENT, CurveClient, RefusedKeyError, client_keys
-from hapticd.paths import CONTROL, DEFAULT_INSTANCE, locate
+from hapticd.paths import CONTROL, DEFAULT_INSTANCE, alive, locate
 
 TIMEOUT_S = 5.0
-"""How long a daemon may take to answer [s]."""
+"""How long a daemon may take to answer, and to begin with what it was asked [s]."""
+
+GRACE_S = 1.0
+"""How long the answer that a request came too late may take [s]."""
 
 CALIBRATION_TIMEOUT_S = 120.0
 """How long a device may take to calibrate [s]."""
+
+
+_LATER = ("arm", "calibrate", "tare", "clear")  # what may have to wait, and must not be done when it is too late
 
 
 class RefusedError(HapticdError):
@@ -39,10 +46,13 @@ def command(
 ) -> dict[str, Any]:
     """Send one request and wait for its answer.
 
+    What the daemon could not begin within `TIMEOUT_S` it never does. A verdict on a configuration is waited for as
+    long as the daemon lives.
+
     Args:
         do: `status`, `arm`, `disarm`, `calibrate`, `tare`, `clear`, `reload` or `stop`.
         instance: which daemon on this computer, when no endpoint is given.
-        timeout_s: how long to wait for it [s].
+        timeout_s: how long the daemon may be silent [s].
         connect: the daemon's `control.tcp` as seen from here, such as "tcp://lab.example:9873".
         keys: key file for it; None: the one that $HAPTICD_KEYS names.
         fields: what else belongs to the request; `wait=True` makes `reload` answer with its verdict.
@@ -52,35 +62,99 @@ def command(
 
     Raises:
         ConfigError: the key file cannot be used.
-        InstanceError: no daemon answers there.
+        InstanceError: no daemon answers there, or two daemons of this name run.
         RefusedKeyError: commands over TCP take a key that the daemon lists.
         RefusedError: it answers that it will not.
     """
-    endpoint = connect or f"ipc://{locate(CONTROL, instance)}"
+    if connect is None:
+        place = locate(CONTROL, instance)
+        endpoint = f"ipc://{place}"
+        if not alive(place.parent):
+            raise InstanceError(f"no daemon answers on {endpoint}: start it with `hapticd run`, or name its --instance")
+    else:
+        endpoint = connect
     own = client_keys(endpoint, keys)
     if own is None and endpoint.startswith("tcp://"):
         raise RefusedKeyError(
             f"{endpoint}: commands over TCP take keys: name your key file with --keys or ${ENVIRONMENT}"
         )
-    advice = "is it its control.tcp?" if connect else "start it with `hapticd run`, or name its --instance"
     context = zmq.Context()
     socket = context.socket(zmq.DEALER)
     connection = CurveClient(socket, endpoint, own)
     try:
         connection.connect()
-        socket.send(msgpack.packb({"do": do, **fields}))
-        if not connection.wait(timeout_s):
-            raise InstanceError(f"no daemon answers on {endpoint}{connection.doubt or f': {advice}'}")
-        answer: dict[str, Any] = msgpack.unpackb(socket.recv())
+        talk = _Talk(socket, connection, timeout_s)
+        request: dict[str, Any] = {"do": do, **fields}
+        if do in _LATER:
+            request["by_ns"] = talk.clock_ns(local=connect is None) + int(min(timeout_s, TIMEOUT_S) * 1e9)
+        answer = talk.ask(request)
     except zmq.ZMQError as error:
         why = zmq.strerror(error.errno or 0)
         raise InstanceError(f"{endpoint}: {why}; an endpoint is tcp://HOST:PORT or ipc://PATH") from error
+    except SilenceError as error:
+        if connect is None or connection.connected:
+            text = f"{endpoint}: a daemon runs there and does not answer; what it does is in its log"
+            late = f"; what it has not begun by now ({do}) it will not do" if do in _LATER else ""
+            raise InstanceError(text + late) from error
+        raise InstanceError(
+            f"no daemon answers on {endpoint}{connection.doubt or ': is it its control.tcp?'}"
+        ) from error
     finally:
         connection.close()
         context.term()
     if not answer["ok"]:
         raise (RefusedConfigError if do == "reload" else RefusedError)(answer["text"])
     return answer
+
+
+class _Talk:
+    """Requests and their answers, one at a time."""
+
+    def __init__(self, socket: zmq.Socket[bytes], connection: CurveClient, timeout_s: float) -> None:
+        self._socket = socket
+        self._connection = connection
+        self._timeout_s = timeout_s
+
+    def clock_ns(self, *, local: bool) -> int:
+        """CLOCK_MONOTONIC of the daemon when this was called, or earlier [ns].
+
+        Args:
+            local: it is the one of this computer.
+
+        Raises:
+            InstanceError: the daemon is of another version and does not tell.
+            SilenceError: no answer.
+        """
+        asked_ns = time.monotonic_ns()
+        if local:
+            return asked_ns
+        answer = self.ask({"do": "status"})
+        if "clock_ns" not in answer:
+            raise InstanceError(
+                f"hapticd {answer['status'].get('version')} there is too old for this client: upgrade it"
+            )
+        return int(answer["clock_ns"]) - (time.monotonic_ns() - asked_ns)
+
+    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        """The answer to a request.
+
+        Raises:
+            SilenceError: none came, or for a verdict on a configuration not even a sign of life.
+        """
+        self._socket.send(msgpack.packb(request))
+        patient = request["do"] == "reload"
+        silent = False
+        while True:
+            if self._connection.wait(self._timeout_s + GRACE_S):
+                answer: dict[str, Any] = msgpack.unpackb(self._socket.recv())
+                if patient and "status" in answer:
+                    silent = False
+                    continue
+                return answer
+            if not patient or silent:
+                raise SilenceError("no answer")
+            silent = True
+            self._socket.send(msgpack.packb({"do": "status"}))
 
 
 def calibrate(instance: str = DEFAULT_INSTANCE, connect: str | None = None, keys: Path | None = None) -> None:

@@ -62,10 +62,12 @@ class CurveClient:
 
     Attributes:
         doubt: what is wrong with what answers there, empty when nothing is.
+        connected: something there has spoken ZeroMQ with this client.
     """
 
     def __init__(self, socket: zmq.Socket[bytes], endpoint: str, keys: Key | None) -> None:
         self.doubt = ""
+        self.connected = False
         self._socket = socket
         self._endpoint = endpoint
         self._keys = keys
@@ -118,6 +120,7 @@ class CurveClient:
     def _learn(self, event: int, value: int) -> None:
         if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
             self.doubt = ""
+            self.connected = True
         elif event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL and self._keys is not None:
             self.doubt = "; what answers there lacks the server-key of your key file, or is another kind of endpoint"
         elif event == zmq.EVENT_HANDSHAKE_FAILED_AUTH and value == _REFUSED:

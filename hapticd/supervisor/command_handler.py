@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
+from typing import Any
 
 from hapticd.supervisor.commands import Reply
 from hapticd.supervisor.request_queue import Answer
@@ -11,6 +13,9 @@ from hapticd.tick.event import EventCode
 
 KNOWN = ("status", "arm", "disarm", "calibrate", "tare", "clear", "reload", "stop")
 """What the control socket understands."""
+
+PATIENCE_NS = 5_000_000_000
+"""How long a request may wait for the loop when it does not say until when [ns]."""
 
 
 class CommandHandler:
@@ -29,13 +34,13 @@ class CommandHandler:
         for request, reply in state.commands.receive():
             match request["do"]:
                 case "status":
-                    reply(True, status=state.status.made.as_map())
+                    reply(True, status=state.status.made.as_map(), clock_ns=time.monotonic_ns())
                 case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if state.recovery.lost:
                     self._without_device(do, reply)
                 case "disarm":
                     state.requests.disarm(_answering(reply))
                 case "arm" | "calibrate" | "tare" | "clear" as do:
-                    state.requests.submit({"do": do}, _answering(reply))
+                    state.requests.submit({"do": do}, _answering(reply), _deadline_ns(request))
                 case "reload" if request.get("wait"):
                     state.reload_asked.append(_answering(reply))
                 case "reload":
@@ -62,6 +67,13 @@ class CommandHandler:
                 recovery.amend(replace(recovery.resume, latched=False))
                 state.tell(EventCode.CLEARED, "fault cleared")
                 reply(True)
+
+
+def _deadline_ns(request: dict[str, Any]) -> int:
+    """Until when the loop may begin with a request: as it says itself, and no later than is usual."""
+    usual_ns = time.monotonic_ns() + PATIENCE_NS
+    by_ns = request.get("by_ns")
+    return min(by_ns, usual_ns) if isinstance(by_ns, int) else usual_ns
 
 
 def _unanswered(_verdict: str) -> None:

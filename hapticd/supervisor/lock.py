@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import fcntl
 import os
+import time
 from pathlib import Path
 
 from hapticd.errors import InstanceError
-from hapticd.paths import make_runtime_directory
+from hapticd.paths import LOCK, make_runtime_directory
+
+LOOK_S = 0.2
+"""How long a client that looks whether a daemon lives may hold the lock, which takes it microseconds [s]."""
 
 
 class InstanceLock:
@@ -27,13 +31,13 @@ class InstanceLock:
 
     def __init__(self, instance: str) -> None:
         self.directory: Path = make_runtime_directory(instance)
-        path = self.directory / "lock"
+        path = self.directory / LOCK
         try:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise InstanceError(f"{path}: {error.strerror}; run as the user that owns the directory") from error
         try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _take(self._descriptor)
         except OSError as error:
             holder = os.pread(self._descriptor, 32, 0).decode(errors="replace").strip()
             os.close(self._descriptor)
@@ -52,3 +56,16 @@ class InstanceLock:
         """Give the instance back and leave nothing behind."""
         self._path.unlink(missing_ok=True)
         os.close(self._descriptor)
+
+
+def _take(descriptor: int) -> None:
+    give_up_s = time.monotonic() + LOOK_S
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > give_up_s:
+                raise
+            time.sleep(0.01)
+        else:
+            return

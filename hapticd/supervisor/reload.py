@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
 from hapticd.config.file import read
@@ -30,6 +32,10 @@ LIVE: Final = (
 """Tables and keys that may change while the loop runs; everything else needs a restart."""
 
 
+CLOSE_S = 1.0
+"""How long a law that is being imported may hold up the end of the daemon [s]."""
+
+
 class Reload:
     """Takes the file over, when somebody asks or, where the file says so, when it is saved; one at a time.
 
@@ -40,29 +46,44 @@ class Reload:
     def __init__(self, state: DaemonState) -> None:
         self._state = state
         self._under_way = False
+        self._reading: _Reading | None = None
+        self._answers: list[Answer] = []
         self._watcher: FileWatcher | None = None
         self._follow()
 
     def turn(self) -> None:
-        """Begin what was asked for, or what was saved; returns at once. A file that cannot be used changes nothing."""
+        """Begin or go on with what was asked for, or what was saved; returns at once.
+
+        A file that cannot be used changes nothing, and neither does any file before its verdict is known.
+        """
         if self._under_way:
             return
-        saved = self._watcher.take() if self._watcher is not None else None
         state = self._state
-        if state.reload_asked:
-            answers, state.reload_asked = state.reload_asked, []
-            try:
-                path = state.config.path
-                self._begin(parse(read(path, files_only=True), str(path)), answers)
-            except HapticdError as error:
-                self._refuse(str(error), answers)
-        elif isinstance(saved, ConfigError):
+        if self._reading is None and state.reload_asked:
+            self._answers, state.reload_asked = state.reload_asked, []
+            self._reading = _Reading(state.config.path)
+        if self._reading is not None:
+            read_now = self._reading.outcome
+            if read_now is None:
+                return
+            answers, self._answers, self._reading = self._answers, [], None
+            if isinstance(read_now, HapticdError):
+                self._refuse(str(read_now), answers)
+            else:
+                self._begin(read_now, answers)
+            return
+        saved = self._watcher.take() if self._watcher is not None else None
+        if isinstance(saved, ConfigError):
             self._refuse(str(saved), [])
         elif saved is not None and saved.text != state.config.text:
             self._begin(saved, [])
 
     def close(self) -> None:
         """Look at the file no more; the daemon ends."""
+        for answer in [*self._answers, *self._state.reload_asked]:
+            answer("the daemon has stopped")
+        if self._reading is not None:
+            self._reading.join(CLOSE_S)
         if self._watcher is not None:
             self._watcher.close()
             self._watcher.wait_closed()
@@ -117,6 +138,28 @@ class Reload:
         elif self._watcher is not None and not wanted:
             self._watcher.close()
             self._watcher = None
+
+
+class _Reading(threading.Thread):
+    """A file read and checked in a thread of its own: to check a law is to import it, which may take its time.
+
+    Attributes:
+        outcome: what it says, or why it cannot be used; None as long as that is not known.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(name="reload", daemon=True)
+        self.outcome: LoadedConfig | HapticdError | None = None
+        self._path = path
+        self.start()
+
+    def run(self) -> None:
+        try:
+            self.outcome = parse(read(self._path, files_only=True), str(self._path))
+        except HapticdError as error:
+            self.outcome = error
+        except Exception as error:  # noqa: BLE001 - whatever a plug-in's checks raise, a verdict has to come
+            self.outcome = HapticdError(f"{self._path}: cannot be checked: {type(error).__name__}: {error}")
 
 
 def needs_restart(now: LoadedConfig, wanted: LoadedConfig) -> Iterator[str]:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from hapticd.errors import HapticdError
 from hapticd.loop.memory import ANSWERED, ANSWERED_AT, DISARM, DISARMED, DISARMED_SINCE, REQUESTS, SharedMemory
 
 MOST_WAITING = 100
+
+EXPIRED = "not done, and it will not be: the loop was busy until the time for it had passed; ask again"
+"""The answer to a request whose deadline has come while it waited."""
 
 Answer = Callable[[str], None]
 """Called with "" when the loop has done it, else with why not."""
@@ -24,34 +29,39 @@ class RequestQueue:
 
     def __init__(self, shared: SharedMemory) -> None:
         self._shared = shared
-        self._waiting: deque[tuple[dict[str, Any], Answer]] = deque()
+        self._waiting: deque[_Waiting] = deque()
         self._posted: Answer | None = None
         self._calibrating = False
         self._disarming: list[Answer] = []
 
-    def submit(self, request: dict[str, Any], answer: Answer) -> None:
+    def submit(self, request: dict[str, Any], answer: Answer, by_ns: int | None = None) -> None:
         """Queue a request; its answer comes from a later `turn`.
 
         During a calibration, which takes as long as it takes, all are refused: who has given up waiting is not to find
         the device armed afterwards.
+
+        Args:
+            request: for the loop.
+            answer: called with what came of it.
+            by_ns: on CLOCK_MONOTONIC, when it is too late for the loop to begin with it [ns]; None: never.
         """
         if self._calibrating:
             answer("the device is calibrating: wait, or call it off with `hapticd disarm`")
         elif len(self._waiting) >= MOST_WAITING:
             answer("too many requests are waiting for the loop; try again")
         else:
-            self._waiting.append((request, answer))
+            self._waiting.append(_Waiting(request, answer, by_ns))
 
     def disarm(self, answer: Answer) -> None:
         """Have the loop let go at its next tick; a calibration is called off, and what was to arm later does not."""
         self._shared.words[DISARM] += 1
         self._disarming.append(answer)
         waiting, self._waiting = self._waiting, deque()
-        for request, other in waiting:
-            if request["do"] in ("arm", "calibrate"):
-                other(DISARMED_SINCE)
+        for one in waiting:
+            if one.request["do"] in ("arm", "calibrate"):
+                one.answer(DISARMED_SINCE)
             else:
-                self._waiting.append((request, other))
+                self._waiting.append(one)
 
     def turn(self, fetched: int) -> None:
         """Hand out the answers that have come, and send the next request.
@@ -62,6 +72,7 @@ class RequestQueue:
             fetched: tick records of this loop that were fetched so far.
         """
         words = self._shared.words
+        self._drop_expired(time.monotonic_ns())
         if self._disarming and words[DISARMED] == words[DISARM]:
             answers, self._disarming = self._disarming, []
             for answer in answers:
@@ -73,22 +84,22 @@ class RequestQueue:
             self._calibrating = False
             answer(self._shared.verdict())
         if self._waiting:
-            request, answer = self._waiting.popleft()
+            first = self._waiting.popleft()
             try:
-                self._shared.post(request)
+                self._shared.post(first.request)
             except HapticdError as error:
-                answer(str(error))
+                first.answer(str(error))
             else:
-                self._posted = answer
-                if request["do"] == "calibrate":
+                self._posted = first.answer
+                if first.request["do"] == "calibrate":
                     self._calibrating = True
                     waiting, self._waiting = self._waiting, deque()
-                    for other, its_answer in waiting:
-                        self.submit(other, its_answer)
+                    for other in waiting:
+                        self.submit(other.request, other.answer)
 
     def abandon(self, why: str) -> None:
         """Answer all that wait: the loop is gone, and so is its force, which is what disarming asks for."""
-        disarming, answers = self._disarming, [answer for _, answer in self._waiting]
+        disarming, answers = self._disarming, [one.answer for one in self._waiting]
         if self._posted is not None:
             if self._shared.words[ANSWERED] == self._shared.words[REQUESTS]:
                 self._posted(self._shared.verdict())
@@ -102,3 +113,23 @@ class RequestQueue:
             answer(why)
         for answer in disarming:
             answer("")
+
+    def _drop_expired(self, now_ns: int) -> None:
+        """Answer what has waited for too long, at once: who asked is about to stop listening."""
+        if any(one.expired(now_ns) for one in self._waiting):
+            waiting, self._waiting = self._waiting, deque()
+            for one in waiting:
+                if one.expired(now_ns):
+                    one.answer(EXPIRED)
+                else:
+                    self._waiting.append(one)
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    request: dict[str, Any]
+    answer: Answer
+    by_ns: int | None
+
+    def expired(self, now_ns: int) -> bool:
+        return self.by_ns is not None and now_ns >= self.by_ns
