@@ -78,9 +78,7 @@ def make_runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
     try:
         directory.parent.mkdir(mode=mode, parents=True, exist_ok=True)
         if shared and not _ours(directory.parent):
-            raise InstanceError(
-                f"{directory.parent}: belongs to somebody else; set HAPTICD_RUNTIME_DIR to one of yours"
-            )
+            raise _foreign(directory.parent)
         directory.mkdir(mode=mode, exist_ok=True)
     except OSError as error:
         raise InstanceError(
@@ -119,19 +117,15 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
 
     Raises:
         ConfigError: the instance's name is none that a directory could have.
-        InstanceError: both live, or the daemon's directory is not open to this user.
+        InstanceError: both live, the daemon's directory is not open to this user, or somebody else has made it.
     """
-    whose, _, plain = instance.rpartition("/")
-    if whose not in ("", *_WHOSE):
-        plain = instance  # no directory can have that name, which is said below
+    whose, plain = _named(instance)
     given = named_directory("RUNTIME", plain)
     if given is not None:
         return given / name
-    places = {"system": _RUN / plain, "user": _user_runtime(plain)}
-    if whose:
-        places = {whose: places[whose]}
+    places = instance_directories(instance)
     living, there, closed = [], [], None
-    for directory in places.values():
+    for directory in places:
         try:
             if alive(directory):
                 living.append(directory)
@@ -149,7 +143,26 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
     found = [*living, *there]
     if found:
         return found[0] / name
-    return (places[whose] if whose else runtime_directory(plain)) / name
+    place = {"system": _RUN / plain, "user": _user_runtime(plain)}.get(whose) or runtime_directory(plain)
+    if _is_foreign(place):
+        raise _foreign(_temporary())
+    return place / name
+
+
+def instance_directories(instance: str) -> list[Path]:
+    """Where daemons that have a name may live: the system's and this user's own.
+
+    A directory in /tmp that somebody else has made in this user's place is not among them.
+
+    Raises:
+        ConfigError: the name is none that a directory could have.
+    """
+    whose, plain = _named(instance)
+    given = named_directory("RUNTIME", plain)
+    if given is not None:
+        return [given]
+    places = {"system": _RUN / plain, "user": _user_runtime(plain)}
+    return [place for owner, place in places.items() if whose in ("", owner) and not _is_foreign(place)]
 
 
 def telemetry_endpoint(instance: str = DEFAULT_INSTANCE) -> str:
@@ -172,6 +185,21 @@ def named_directory(kind: Literal["RUNTIME", "STATE"], instance: str) -> Path | 
     if unit:
         return Path(unit) if Path(unit).name == instance else Path(unit) / instance
     return None
+
+
+def _named(instance: str) -> tuple[str, str]:
+    """Whose daemon is meant, "" for either, and its name."""
+    whose, slash, plain = instance.partition("/")
+    return (whose, plain) if slash and whose in _WHOSE else ("", instance)
+
+
+def _is_foreign(directory: Path) -> bool:
+    place = _temporary()
+    return directory.is_relative_to(place) and place.exists() and not _ours(place)
+
+
+def _foreign(directory: Path) -> InstanceError:
+    return InstanceError(f"{directory}: belongs to somebody else; set HAPTICD_RUNTIME_DIR to one of yours")
 
 
 def _user_runtime(instance: str) -> Path:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
+import threading
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,6 +15,7 @@ import pytest
 from hapticd import paths
 from hapticd.errors import ConfigError, InstanceError
 from hapticd.paths import locate, make_runtime_directory, runtime_directory, telemetry_endpoint
+from hapticd.supervisor.lock import InstanceLock
 
 
 @pytest.fixture
@@ -71,6 +77,67 @@ def test_a_client_prefers_the_systems_daemon_then_the_users(user: Path, monkeypa
     system = sockets_of(user / "run" / "hapticd" / "default")
     assert locate("telemetry") == system
     assert locate("telemetry", "other").parent.name == "other"
+
+
+@contextlib.contextmanager
+def living_in(directory: Path) -> Iterator[None]:
+    directory.mkdir(parents=True, exist_ok=True)
+    with (directory / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+@pytest.mark.usefixtures("not_root")
+def test_what_a_killed_daemon_left_behind_does_not_shadow_the_one_that_lives(
+    user: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """S6: a user's `disarm` failed while their own daemon ran."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(user / "session"))
+    system = sockets_of(user / "run" / "hapticd" / "default")
+    (system.parent / "lock").touch()
+    own = sockets_of(user / "session" / "hapticd" / "default")
+    assert locate("telemetry") == system
+    with living_in(own.parent):
+        assert locate("telemetry") == own
+    with living_in(system.parent):
+        assert locate("telemetry") == system
+
+
+@pytest.mark.usefixtures("not_root")
+def test_of_two_daemons_that_live_none_is_chosen_for_the_user(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """S6: a member of the group who tried a simulation could have armed the real device."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(user / "session"))
+    system, own = user / "run" / "hapticd" / "lab", user / "session" / "hapticd" / "lab"
+    with living_in(system), living_in(own):
+        with pytest.raises(InstanceError, match="--instance system/lab or --instance user/lab"):
+            locate("control", "lab")
+        assert locate("control", "system/lab") == system / "control"
+        assert locate("control", "user/lab") == own / "control"
+        with pytest.raises(ConfigError, match="instance = "):
+            locate("control", "root/lab")
+
+
+@pytest.mark.usefixtures("not_root")
+def test_a_directory_that_somebody_else_made_in_tmp_is_not_trusted(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """S10: a client talked to whatever listened in a /tmp/hapticd-UID of somebody else."""
+    foreign = user / "tmp" / "hapticd-1000"
+    sockets_of(foreign / "default")
+    with living_in(foreign / "default"):
+        monkeypatch.setattr(paths, "_ours", lambda _: False)
+        with pytest.raises(InstanceError, match="belongs to somebody else"):
+            locate("telemetry")
+        system = sockets_of(user / "run" / "hapticd" / "default")
+        assert locate("telemetry") == system
+
+
+def test_a_daemon_starts_although_a_client_is_just_looking(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "run"))
+    directory = make_runtime_directory()
+    with (directory / "lock").open("w") as looking:
+        fcntl.flock(looking, fcntl.LOCK_SH)
+        threading.Timer(0.05, fcntl.flock, (looking, fcntl.LOCK_UN)).start()
+        InstanceLock("default").close()
+        time.sleep(0.1)
 
 
 def test_a_directory_is_made_once_and_below_tmp_for_its_user_alone(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:

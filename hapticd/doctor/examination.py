@@ -15,7 +15,7 @@ from hapticd.doctor.finding import Check, Finding, Mark, examine, ok
 from hapticd.doctor.latency import Latency, judge, measure
 from hapticd.doctor.tree import ROOT
 from hapticd.keys.store import KeyDirectory, key_directory
-from hapticd.paths import fault_directory, runtime_directory
+from hapticd.paths import fault_directory, instance_directories, runtime_directory
 
 SCHEMA = 1
 """Version of what `--json` prints."""
@@ -45,7 +45,7 @@ class Examination:
         options = self.wanted.loaded.options if self.wanted.loaded else None
         directory = runtime_directory(self.instance)
         tried = functools.cache(lambda: attempt(loop.priority))
-        daemon = functools.cache(lambda: endpoints.running(directory, root))
+        daemon = functools.cache(self._daemon)
         # The daemon's device would only be shown as held, and looking for it might disturb the loop.
         looked = functools.cache(lambda: discovery.look({name: options}, find=not _or_none(daemon))[0])
         faults = fault_directory(self.instance)
@@ -90,13 +90,17 @@ class Examination:
         """
 
         def look() -> Finding:
-            process = endpoints.running(runtime_directory(self.instance), self.root)
-            if process:
+            if self._daemon():
                 return ok("not measured: it would delay the running daemon; see hapticd watch")
             self.latency = measure(self.wanted.loop, seconds, progress, self.root)
             return judge(self.latency)
 
         return examine(Check("latency.loop", "latency", look))
+
+    def _daemon(self) -> int:
+        """Process of the daemon that a command would reach, the system's or this user's own; 0 when there is none."""
+        found = (endpoints.running(directory, self.root) for directory in instance_directories(self.instance))
+        return next(filter(None, found), 0)
 
 
 def verdict(findings: list[Finding]) -> Mark:

@@ -13,6 +13,7 @@ import zmq
 
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.keys.file import Key, read
+from hapticd.keys.heartbeat import expect_signs_of_life
 
 ENVIRONMENT = "HAPTICD_KEYS"
 """Environment variable that names a client's key file."""
@@ -75,6 +76,8 @@ class CurveClient:
             socket.setsockopt(zmq.CURVE_SERVERKEY, keys.server.encode())
             socket.setsockopt(zmq.CURVE_PUBLICKEY, keys.public.encode())
             socket.setsockopt(zmq.CURVE_SECRETKEY, keys.secret.encode())
+        if endpoint.startswith("tcp://"):
+            expect_signs_of_life(socket)
         if "[" in endpoint:
             socket.setsockopt(zmq.IPV6, 1)
         self._news: zmq.Socket[Any] = socket.get_monitor_socket(_NEWS)

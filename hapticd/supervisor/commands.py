@@ -16,10 +16,11 @@ import zmq
 
 from hapticd.errors import InstanceError
 from hapticd.keys.connections import ConnectionBound
+from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
 
-_LARGEST_REQUEST = 1024  # bytes of a frame; the handshake with keys is the longest
+_LARGEST_REQUEST = 1 << 13  # bytes of a frame
 _MOST_UNREAD = 100  # requests of a client, each of any number of frames
 _MOST_AT_ONCE = 50
 _LAST_WORDS_MS = 100
@@ -101,6 +102,7 @@ class CommandSocket:
         try:
             if ring is None:
                 raise InstanceError(f"{endpoint}: takes keys: make them with `hapticd keys make`")
+            expect_signs_of_life(self._socket)
             self._gate = CurveServer(self._socket, endpoint, ring.pair, ring.commanders())
         except zmq.ZMQError as error:
             self.close()

@@ -18,6 +18,7 @@ import zmq
 from hapticd.config.models import TelemetryConfig
 from hapticd.errors import InstanceError
 from hapticd.keys.connections import ConnectionBound
+from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.policy import stays_here
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
@@ -118,6 +119,7 @@ class Publisher:
             self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
             if config.ipc and ipc_path is not None:
                 self._bind_ipc(ipc_path)
+            expect_signs_of_life(self._socket)
             if config.tcp is not None:
                 self._bind_tcp(config.tcp, ring)
         except BaseException:
@@ -130,7 +132,11 @@ class Publisher:
         return self._batch_due_ns
 
     def reconfigure(self, config: TelemetryConfig) -> None:
-        """Take over batching and decimation from a reloaded file; endpoints stay as they were bound."""
+        """Take over batching and decimation from a reloaded file; endpoints stay as they were bound.
+
+        What waits is sent first: a status tells the step of `seq` of all that comes after it.
+        """
+        self._send_batch()
         self._batch_ticks = config.batch_ticks
         self._every_ticks = config.every_ticks
         self._input_every_tick = config.input_every_tick

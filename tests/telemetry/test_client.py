@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import itertools
 import math
+import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
@@ -33,10 +34,13 @@ from hapticd.client import (
     WireError,
     decode,
 )
+from hapticd.config.models import TelemetryConfig
+from hapticd.supervisor.reload import LIVE
 from hapticd.telemetry.wire import Topic, new_packer
 from hapticd.tick import event as contract
 from tests.examples import examples
 from tests.telemetry.sockets import PATIENCE_S, Wire, served, ticks, wait_until
+from tests.telemetry.test_publisher import Stylus
 
 EVERY_TICK = (Position, Energy, Damping, Timing)
 
@@ -61,6 +65,35 @@ def take(client: Client, count: int) -> list[Record]:
     while len(records) < count:
         records += client.receive(PATIENCE_S) or pytest.fail("nothing came")
     return records
+
+
+RELOADS: dict[str, Any] = {"batch_ticks": 7, "every_ticks": 3, "input_every_tick": True}
+"""Another value for each key of [telemetry] that a reload may change."""
+
+
+def test_no_reload_of_telemetry_makes_a_client_count_ticks_that_were_not_lost() -> None:
+    """S8: the status overtook the batch that waited, and its ticks were counted by the new step: gaps of 8, 9 and 3."""
+    assert {f"telemetry.{key}" for key in RELOADS} == {key for key in LIVE if key.startswith("telemetry.")}
+    changes = [*RELOADS.items(), *((key, TelemetryConfig.model_fields[key].default) for key in RELOADS)]
+    with Wire(inputs=Stylus()) as wire, heard(wire) as client:
+        first, wanted = 0, TelemetryConfig()
+        for key, value in changes:
+            wire.publisher.publish(ticks(25, first))
+            wanted = wanted.model_copy(update={key: value})
+            wire.publisher.reconfigure(wanted)
+            wire.publisher.status(Status(law=key).as_map())
+            wire.publisher.publish(ticks(25, first + 25))
+            first += 50
+            wire.publisher.flush(sys.maxsize)
+            wire.publisher.event(contract.LoopEvent(103, key, first, 0))
+            received = []
+            while not (received and isinstance(received[-1], Event)):
+                received += client.receive(PATIENCE_S) or pytest.fail("nothing came")
+            assert [one for one in received if isinstance(one, Gap)] == [], key
+            seqs = [one.seq for one in received if isinstance(one, Position)]
+            assert seqs[0] <= first - 50 + 2
+            assert seqs[-1] >= first - 3
+        assert sum(client.missing.values()) == 0
 
 
 def test_every_topic_arrives_as_its_record() -> None:
