@@ -61,8 +61,9 @@ install: own-place
 		"$(PLACE)/bin/python" -m compileall -q -f -s "$(DESTDIR)" -p / "$(PLACE)/lib"; }
 	"$(PLACE)/bin/python" -P -m hapticd service install --root "$(DESTDIR)/"
 
+# What is not there any more needs no removal.
 uninstall: own-place
-	"$(PLACE)/bin/python" -P -m hapticd service uninstall --root "$(DESTDIR)/"
+	test ! -x "$(PLACE)/bin/python" || "$(PLACE)/bin/python" -P -m hapticd service uninstall --root "$(DESTDIR)/"
 	rm -rf "$(PLACE)"
 
 own-place:

@@ -33,6 +33,7 @@ from hapticd.loop.resume import ResumeState, identity
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.record import RecordLayout
 from hapticd.tick.tick import ControlTick
+from hapticd.version import __version__
 
 WARM_UP_TICKS = 200
 
@@ -72,6 +73,10 @@ def main() -> int:
 
 def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
     request = msgpack.unpackb(sys.stdin.buffer.read())
+    if request.get("version") != __version__:
+        raise HapticdError(
+            f"hapticd {__version__} was installed while {request.get('version')} runs: restart the daemon"
+        )
     config = parse(request["text"], request["name"])
     resume = ResumeState(**request["resume"])
     settings = config.config

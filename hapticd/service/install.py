@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -125,7 +124,8 @@ class Installation:
         self._link(say)
         if self.live:
             self._announce()
-            say("start it, now and with the computer: systemctl enable --now hapticd")
+            for line in advice_after_install(unit_states()):
+                say(line)
 
     def uninstall(self, say: Say) -> None:
         """Stop the service and remove every file except configurations and fault records.
@@ -133,13 +133,16 @@ class Installation:
         Raises:
             InstallationError: not allowed.
         """
-        if self.live and systemd_runs():
-            _run("systemctl", "stop", "hapticd.service", "hapticd@*.service")
-        if shutil.which("systemctl"):
-            with_root = [] if self.live else [f"--root={self.root}"]
-            # There is nothing to disable where it never was installed.
-            if all(self._at(file.path).exists() for file in self.files()):
-                _run("systemctl", *with_root, "disable", "--quiet", *UNITS)
+        running = (
+            [unit.name for unit in unit_states() if unit.active not in ("inactive", "failed")] if self.live else []
+        )
+        if running:
+            _run("systemctl", "stop", *running)
+        for link in self._enabled():
+            try:
+                link.unlink()
+            except OSError as error:
+                raise _denied(link, error) from error
         for path in [*(file.path for file in self.files()), *self._own_link()]:
             if self._remove(path):
                 say(f"removed {path}")
@@ -148,6 +151,12 @@ class Installation:
         kept = [path for path in KEPT if self._at(Path(path)).exists()]
         if kept:
             say(f"kept: {', '.join(kept)}" + (" and the user hapticd" if self.live else ""))
+
+    def _enabled(self) -> list[Path]:
+        """The links by which systemd starts units of the service with the computer, also when a unit has gone."""
+        units = {str(_LIBRARY / "systemd/system" / unit) for unit in UNITS}
+        links = self._at(Path("/etc/systemd/system")).glob("*.wants/hapticd*.service")
+        return [link for link in links if link.is_symlink() and str(link.readlink()) in units]
 
     def _inside(self, path: Path) -> Path:
         """A path as the system in `root` will see it."""
@@ -226,6 +235,18 @@ class Installation:
             _run("udevadm", "trigger", *(f"--subsystem-match={name}" for name in ("misc", "usb", "hidraw", "tty")))
         if systemd_runs():
             _run("systemctl", "daemon-reload")
+
+
+def advice_after_install(units: Sequence[UnitState]) -> list[str]:
+    """What is left to do after the files are in place, a line each.
+
+    A unit that runs is not restarted: a device of it may be in a hand. Until it is, it goes on as it was before, and
+    no process of the new version joins it.
+    """
+    running = [unit.name for unit in units if unit.active not in ("inactive", "failed")]
+    if not running:
+        return ["start it, now and with the computer: systemctl enable --now hapticd"]
+    return [f"{name} still runs what was installed before: systemctl restart {name}" for name in running]
 
 
 def systemd_runs() -> bool:

@@ -15,6 +15,7 @@ from typing import Any
 
 import msgpack
 
+from hapticd import version
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.models import MAX_WALLS
 from hapticd.device import DeviceInfo
@@ -175,7 +176,8 @@ class LoopStart:
     def __init__(self, config: LoadedConfig, resume: ResumeState = FROM_START) -> None:
         self._config = config
         self._give_up_s = time.monotonic() + TIMEOUT_S
-        request = msgpack.packb({"text": config.text, "name": str(config.path), "resume": asdict(resume)})
+        wanted = {"version": version.__version__, "text": config.text, "name": str(config.path)}
+        request = msgpack.packb(wanted | {"resume": asdict(resume)})
         self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # The request lies in a file, so that neither side waits for the other.
         with theirs, os.fdopen(os.memfd_create("request"), "w+b") as file:

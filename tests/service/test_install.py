@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.service.install import Installation, InstallationError
+from hapticd.service.install import Installation, InstallationError, UnitState, advice_after_install
 from tests.service.machine import SOURCE
 
 CONFIG = "etc/hapticd/hapticd.toml"
@@ -82,6 +82,35 @@ def test_an_uninstall_leaves_configurations_and_what_others_own(tmp_path: Path) 
     assert files(tmp_path) == {CONFIG, "etc/hapticd/left.toml", "usr/local/lib/udev/rules.d/99-mine.rules"}
     assert not (tmp_path / "usr/local/lib/systemd").exists()
     installation.uninstall(silent)
+
+
+def test_an_uninstall_removes_the_links_of_units_that_have_gone_already(tmp_path: Path) -> None:
+    """S9: one missing file left every link behind, and systemd complained at each start of the computer."""
+    installation = installed(tmp_path)
+    wants = tmp_path / "etc/systemd/system/multi-user.target.wants"
+    wants.mkdir(parents=True)
+    units = Path("/usr/local/lib/systemd/system")
+    (wants / "hapticd.service").symlink_to(units / "hapticd.service")
+    (wants / "hapticd@left.service").symlink_to(units / "hapticd@.service")
+    (wants / "hapticd@other.service").symlink_to("/srv/other/hapticd@.service")
+    (tmp_path / "usr/local/lib/systemd/system/hapticd.service").unlink()
+    for _ in range(2):
+        installation.uninstall(silent)
+        assert files(tmp_path) == {CONFIG, "etc/systemd/system/multi-user.target.wants/hapticd@other.service"}
+
+
+def test_what_runs_after_an_install_is_named_with_how_to_restart_it() -> None:
+    """S9: a second install said how to start it, and the old process went on unseen."""
+    left = UnitState("hapticd@left.service", "active", "enabled", "1000 Hz", "success", 0)
+    one = UnitState("hapticd.service", "inactive", "disabled", "", "success", 0)
+    assert advice_after_install([one]) == ["start it, now and with the computer: systemctl enable --now hapticd"]
+    assert advice_after_install([one, left]) == [
+        "hapticd@left.service still runs what was installed before: systemctl restart hapticd@left.service"
+    ]
+
+
+def test_make_uninstall_may_be_asked_for_twice(tmp_path: Path) -> None:
+    make("uninstall", f"DESTDIR={tmp_path}")
 
 
 def test_a_command_of_the_same_name_is_left_alone(tmp_path: Path) -> None:

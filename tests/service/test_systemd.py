@@ -425,10 +425,21 @@ def test_udev_lets_the_group_hold_the_processor_awake(machine: Machine) -> None:
     assert rules == [f"GROUP {group}", "MODE 0660"], done.stdout + done.stderr
 
 
+def test_a_second_install_says_what_is_to_be_restarted_and_the_old_process_goes_on(machine: Machine) -> None:
+    machine.run("systemctl", "start", "hapticd")
+    before = machine.processes("hapticd")
+    done = machine.run("make", "-C", "/opt/src", "install")
+    assert "hapticd.service still runs what was installed before: systemctl restart hapticd.service" in done.stdout
+    assert machine.processes("hapticd") == before
+    machine.run("systemctl", "stop", "hapticd")
+
+
 def test_an_uninstall_leaves_configurations_only(machine: Machine) -> None:
     """The last test: the machine has no service afterwards."""
     machine.run("systemctl", "enable", "--now", "hapticd@left")
-    machine.run("make", "-C", "/opt/src", "uninstall")
+    machine.path("/usr/local/lib/sysusers.d/hapticd.conf").unlink()  # one that is missing keeps no other
+    for _ in range(2):
+        machine.run("make", "-C", "/opt/src", "uninstall")
     assert machine.show("hapticd@left", "ActiveState") == "inactive"
     assert machine.show("hapticd", "LoadState") == "not-found"
     found = machine.run(

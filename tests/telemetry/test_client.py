@@ -86,7 +86,7 @@ def test_no_reload_of_telemetry_makes_a_client_count_ticks_that_were_not_lost() 
             first += 50
             wire.publisher.flush(sys.maxsize)
             wire.publisher.event(contract.LoopEvent(103, key, first, 0))
-            received = []
+            received: list[Record] = []
             while not (received and isinstance(received[-1], Event)):
                 received += client.receive(PATIENCE_S) or pytest.fail("nothing came")
             assert [one for one in received if isinstance(one, Gap)] == [], key
