@@ -146,7 +146,7 @@ class _Talk:
         silent = False
         while True:
             if self._connection.wait(self._timeout_s + GRACE_S):
-                answer: dict[str, Any] = msgpack.unpackb(self._socket.recv())
+                answer: dict[str, Any] = msgpack.unpackb(self._socket.recv(), unicode_errors="surrogateescape")
                 if patient and "status" in answer:
                     silent = False
                     continue

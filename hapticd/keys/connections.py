@@ -158,6 +158,27 @@ class _Client:
     odd: int = 0
 
 
+def local_peer(descriptor: int) -> str:
+    """Who is at the other end of a connection within this computer, as the kernel knows; "" when it does not.
+
+    Args:
+        descriptor: of the connection, as ZeroMQ tells with a message.
+    """
+    with contextlib.suppress(OSError):
+        held = os.dup(descriptor)
+        try:
+            connection = sockets.socket(fileno=held)
+            size = struct.calcsize("iII")
+            process, user, _group = struct.unpack(
+                "iII", connection.getsockopt(sockets.SOL_SOCKET, sockets.SO_PEERCRED, size)
+            )
+            connection.detach()
+        finally:
+            os.close(held)
+        return f"user {user}, process {process}"
+    return ""
+
+
 def _enough(limit: int) -> bool:
     return limit == resource.RLIM_INFINITY or limit >= DESCRIPTORS
 

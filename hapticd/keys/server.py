@@ -35,6 +35,7 @@ class CurveServer:
         endpoint: such as tcp://0.0.0.0:9872.
         pair: the daemon's own keys.
         admitted: public keys of those that may come in.
+        watch_only: those that come in here watch and do not command.
 
     Attributes:
         endpoint: as it was bound.
@@ -43,11 +44,14 @@ class CurveServer:
         zmq.ZMQError: it cannot be bound.
     """
 
-    def __init__(self, socket: zmq.Socket[bytes], endpoint: str, pair: Key, admitted: frozenset[str]) -> None:
+    def __init__(
+        self, socket: zmq.Socket[bytes], endpoint: str, pair: Key, admitted: frozenset[str], *, watch_only: bool = False
+    ) -> None:
         self.endpoint = endpoint
         self._socket = socket
         self._pair = pair
         self._admitted = admitted
+        self._listing = " --watch-only" if watch_only else ""
         self._strangers: set[tuple[str, str]] = set()
         self._open = False
         self._closing = False
@@ -125,7 +129,7 @@ class CurveServer:
         """Log a refused key with the command that lists it; once for each stranger, since it may try for ever."""
         if (address, key) not in self._strangers and len(self._strangers) < _MOST_STRANGERS:
             self._strangers.add((address, key))
-            advice = f"hapticd keys add NAME {shlex.quote(key)}"
+            advice = f"hapticd keys add NAME {shlex.quote(key)}{self._listing}"
             log.warning(
                 "%s: refused %s, its key is not listed for this; to list it: %s", self.endpoint, address, advice
             )

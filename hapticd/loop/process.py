@@ -56,7 +56,8 @@ def main() -> int:
         control = _prepare(channel, arguments.parent)
     except HapticdError as error:
         with contextlib.suppress(ConnectionError):
-            channel.send(msgpack.packb({"error": str(error)[:_LONGEST_ERROR], "exit_code": error.exit_code}))
+            refusal = {"error": str(error)[:_LONGEST_ERROR], "exit_code": error.exit_code}
+            channel.send(msgpack.packb(refusal, unicode_errors="surrogateescape"))
         return error.exit_code
     except ConnectionError:
         return 1  # the supervisor is gone
@@ -72,7 +73,7 @@ def main() -> int:
 
 
 def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
-    request = msgpack.unpackb(sys.stdin.buffer.read())
+    request = msgpack.unpackb(sys.stdin.buffer.read(), unicode_errors="surrogateescape")
     if request.get("version") != __version__:
         raise HapticdError(
             f"hapticd {__version__} was installed while {request.get('version')} runs: restart the daemon"

@@ -177,7 +177,7 @@ class LoopStart:
         self._config = config
         self._give_up_s = time.monotonic() + TIMEOUT_S
         wanted = {"version": version.__version__, "text": config.text, "name": str(config.path)}
-        request = msgpack.packb(wanted | {"resume": asdict(resume)})
+        request = msgpack.packb(wanted | {"resume": asdict(resume)}, unicode_errors="surrogateescape")
         self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # The request lies in a file, so that neither side waits for the other.
         with theirs, os.fdopen(os.memfd_create("request"), "w+b") as file:
@@ -216,7 +216,7 @@ class LoopStart:
             self.end()
             if not answer:
                 raise HapticdError("the loop died while it started; its last words are above")
-            refusal = msgpack.unpackb(answer)
+            refusal = msgpack.unpackb(answer, unicode_errors="surrogateescape")
             if refusal["exit_code"] == ConfigError.exit_code:
                 raise ConfigError(*refusal["error"].split("\n"))
             raise HapticdError(refusal["error"])

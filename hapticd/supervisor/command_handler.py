@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from hapticd.supervisor.commands import Reply
+from hapticd.supervisor.events import log
 from hapticd.supervisor.request_queue import Answer
 from hapticd.supervisor.state import DaemonState
 from hapticd.tick.event import EventCode
@@ -31,7 +32,9 @@ class CommandHandler:
     def turn(self) -> None:
         """Do what has been asked for, or pass it on to the loop, whose answer comes later."""
         state = self._state
-        for request, reply in state.commands.receive():
+        for request, reply, who in state.commands.receive():
+            if request["do"] in KNOWN[1:]:
+                log.info("%s: asked by %s", request["do"], who)
             match request["do"]:
                 case "status":
                     reply(True, status=state.status.made.as_map(), clock_ns=time.monotonic_ns())

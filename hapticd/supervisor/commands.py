@@ -9,13 +9,13 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgpack
 import zmq
 
 from hapticd.errors import InstanceError
-from hapticd.keys.connections import ConnectionBound
+from hapticd.keys.connections import ConnectionBound, local_peer
 from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
@@ -27,6 +27,20 @@ _LAST_WORDS_MS = 100
 
 Reply = Callable[..., None]
 """Call with ok, text and further fields of the answer."""
+
+
+class Request(NamedTuple):
+    """A request that has come.
+
+    Attributes:
+        fields: what it says.
+        reply: how to answer it.
+        who: asks, for people.
+    """
+
+    fields: dict[str, Any]
+    reply: Reply
+    who: str
 
 
 class CommandSocket:
@@ -43,6 +57,7 @@ class CommandSocket:
 
     def __init__(self, path: Path, tcp: str | None = None, ring: KeyRing | None = None) -> None:
         self._path = path
+        self._names = _names(ring)
         self._gate: CurveServer | None = None
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.ROUTER)
@@ -66,11 +81,12 @@ class CommandSocket:
 
     def admit(self, ring: KeyRing) -> None:
         """Take other keys over; who is no longer listed is disconnected."""
+        self._names = _names(ring)
         if self._gate is not None:
             self._gate.renew(ring.pair, ring.commanders())
 
-    def receive(self) -> list[tuple[dict[str, Any], Reply]]:
-        """Requests that have come, each with how to answer it; those that make no sense are answered here."""
+    def receive(self) -> list[Request]:
+        """Requests that have come; those that make no sense are answered here."""
         if self._gate is not None:
             self._gate.turn()
         requests = []
@@ -81,12 +97,11 @@ class CommandSocket:
                 break
             reply = self._replier(who.bytes)
             request = _decoded([frame.bytes for frame in frames])
-            if request is not None:
-                self._connections.heard(int(frames[0].get(zmq.SRCFD)))
             if request is None:
                 reply(False, 'a request is one msgpack map with a text under "do"')
             else:
-                requests.append((request, reply))
+                self._connections.heard(int(frames[0].get(zmq.SRCFD)))
+                requests.append(Request(request, reply, self._who(frames[0])))
         return requests
 
     def close(self) -> None:
@@ -111,13 +126,26 @@ class CommandSocket:
             self.close()
             raise
 
+    def _who(self, frame: zmq.Frame) -> str:
+        try:
+            key = str(frame.get("User-Id"))
+        except zmq.ZMQError:  # it came in without a key, so from this computer
+            return local_peer(int(frame.get(zmq.SRCFD))) or "one who has gone"
+        return f"{self._names.get(key, 'a key that is no longer listed')} at {frame.get('Peer-Address')}"
+
     def _replier(self, identity: bytes) -> Reply:
         def reply(ok: bool, text: str = "", **fields: Any) -> None:
-            answer = msgpack.packb({"ok": ok, "text": text, **fields})
+            # A path need not be UTF-8.
+            answer = msgpack.packb({"ok": ok, "text": text, **fields}, unicode_errors="surrogateescape")
             with contextlib.suppress(zmq.ZMQError):  # who asked has gone
                 self._socket.send_multipart((identity, answer), zmq.NOBLOCK)
 
         return reply
+
+
+def _names(ring: KeyRing | None) -> dict[str, str]:
+    """Names of listed clients by their public keys."""
+    return {} if ring is None else {key.public: name for name, key in ring.clients.items()}
 
 
 def _decoded(frames: list[bytes]) -> dict[str, Any] | None:

@@ -298,7 +298,7 @@ class Publisher:
             )
         try:
             self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_WITH_KEYS)
-            self._gate = CurveServer(self._socket, endpoint, ring.pair, ring.watchers())
+            self._gate = CurveServer(self._socket, endpoint, ring.pair, ring.watchers(), watch_only=True)
         except zmq.ZMQError as error:
             raise _refused(endpoint, error) from error
         self.endpoints.append(self._gate.endpoint)

@@ -16,6 +16,7 @@ import pytest
 import zmq
 
 from hapticd.client.commands import RefusedConfigError, RefusedError, command
+from hapticd.errors import InstanceError
 from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.daemon.test_commands import GOOD_LAW
@@ -138,3 +139,40 @@ def test_a_daemon_that_stands_still_is_not_said_to_be_missing(daemon: Daemon) ->
     assert done.returncode == 1
     assert "a daemon runs there and does not answer" in done.stderr
     assert "hapticd run" not in done.stderr
+
+
+def test_the_log_says_who_asked(daemon: Daemon) -> None:
+    """S10: that the device was armed stood there, and not by whom."""
+    command("arm")
+    asked = f"arm: asked by user {os.geteuid()}, process {os.getpid()}"
+    wait_until(lambda: asked in daemon.output(), "who asked, in the log")
+
+
+def test_without_a_daemon_a_command_does_not_wait_for_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """S10: it took 5.2 s to say so; now it opens no socket for it."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(zmq, "Context", lambda: pytest.fail("it tries to reach a daemon"))
+    with pytest.raises(InstanceError, match=r"no daemon answers on .*: start it with `hapticd run`"):
+        command("arm")
+
+
+def test_a_configuration_may_have_any_name_that_a_file_may_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """S10: a path that is not UTF-8 was a defect at the start."""
+    config = os.fsdecode(bytes(tmp_path) + b"/l\xe4b.toml")
+    Path(config).write_text(PRESSED)
+    environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(tmp_path / "run"), "HAPTICD_STATE_DIR": str(tmp_path)}
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path / "run"))
+    with subprocess.Popen([HAPTICD, "run", "--config", config], env=environment, stderr=subprocess.PIPE) as running:
+        try:
+            wait_until((tmp_path / "run/default/control").exists, "the daemon")
+            assert command("status")["status"]["config_file"] in ("", config)
+            command("reload", wait=True)
+            assert command("status")["status"]["config_file"] == config
+            with Subscriber(f"ipc://{tmp_path}/run/default/telemetry", "hapticd/status") as subscriber:
+                assert subscriber.until("hapticd/status", law="energy-cycle")["config_file"].endswith("b.toml")
+            command("stop")
+            assert running.wait(PATIENCE_S) == 0
+        finally:
+            running.kill()

@@ -53,7 +53,7 @@ class Endpoints:
     def turn(self) -> None:
         """What the supervisor does in each of its turns; every request is granted."""
         self.publisher.service()
-        for request, reply in self.commands.receive():
+        for request, reply, _ in self.commands.receive():
             self.asked.append(request["do"])
             self.granting()
             reply(True, request["do"])

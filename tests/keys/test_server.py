@@ -171,7 +171,7 @@ def test_a_stranger_is_told_of_once_with_the_command_that_lists_it(caplog: pytes
             endpoints.turn_until(stranger.turned_away, "a refusal")
     (line,) = caplog.messages
     assert "refused 127.0.0.1" in line
-    assert line.endswith(f"hapticd keys add NAME {shlex.quote(STRANGER.public)}"), (
+    assert line.endswith(f"hapticd keys add NAME {shlex.quote(STRANGER.public)} --watch-only"), (
         "ready for a shell, whatever is in it"
     )
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from hapticd.keys.connections import DESCRIPTORS
 from hapticd.paths import directory
 from hapticd.service.install import UNITS
 
@@ -71,6 +72,21 @@ def test_the_template_differs_by_its_instance_only() -> None:
     several = [re.sub(r" --instance %i|, instance %i", "", line) for line in several]
     several = [line.replace("%i.toml", "hapticd.toml").replace("%i", "default") for line in several]
     assert several == one
+
+
+def test_the_page_says_what_the_unit_does_after_a_failure() -> None:
+    """S10: the page promised 1 s and five times a minute."""
+    unit = settings("hapticd.service")
+    assert {"RestartSec=5", "StartLimitIntervalSec=0", "WatchdogSec=5"} <= set(unit)
+    page = " ".join((SYSTEMD.parent / "docs/service.md").read_text().split())
+    assert "After a failure it is started again after 5 s, as often as it takes" in page
+    assert "When it is not fed for 5 s" in page
+
+
+def test_the_unit_bounds_what_clients_can_make_of_it() -> None:
+    unit = settings("hapticd.service")
+    assert f"LimitNOFILE={DESCRIPTORS}" in unit
+    assert "MemoryMax=512M" in unit
 
 
 def test_the_user_and_its_groups_come_into_being(tmp_path: Path) -> None:
