@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import re
@@ -127,9 +128,12 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
     living, there, closed = [], [], None
     for directory in places:
         try:
+            socket = directory / name
+            if socket.exists() and not os.access(socket, os.W_OK):
+                raise PermissionError
             if alive(directory):
                 living.append(directory)
-            if (directory / name).exists():
+            if socket.exists():
                 there.append(directory)
         except PermissionError:
             closed = directory
@@ -163,6 +167,26 @@ def instance_directories(instance: str) -> list[Path]:
         return [given]
     places = {"system": _RUN / plain, "user": _user_runtime(plain)}
     return [place for owner, place in places.items() if whose in ("", owner) and not _is_foreign(place)]
+
+
+def living_instances() -> list[str]:
+    """Every instance that lives on this computer and is open to this user, as `locate` takes its name."""
+    given = os.environ.get("HAPTICD_RUNTIME_DIR")
+    if given:
+        return [directory.name for directory in _living(Path(given))]
+    own = _user_runtime(DEFAULT_INSTANCE)
+    found = [f"system/{directory.name}" for directory in _living(_RUN)]
+    return found if _is_foreign(own) else [*found, *(f"user/{directory.name}" for directory in _living(own.parent))]
+
+
+def _living(place: Path) -> list[Path]:
+    living = []
+    with contextlib.suppress(FileNotFoundError, PermissionError):
+        for directory in sorted(place.iterdir()):
+            with contextlib.suppress(PermissionError):
+                if _INSTANCE.fullmatch(directory.name) and alive(directory):
+                    living.append(directory)
+    return living
 
 
 def telemetry_endpoint(instance: str = DEFAULT_INSTANCE) -> str:

@@ -25,7 +25,7 @@ from hapticd.supervisor.status import StatusBuilder
 from hapticd.supervisor.systemd import Notifier
 from hapticd.supervisor.terminal import Terminal
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.wire import measure_epoch_offset_ns
+from hapticd.telemetry.wire import followed_offset_ns, measure_epoch_offset_ns
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.flags import Flag
 from hapticd.tick.record import TickRecord
@@ -71,7 +71,7 @@ class Daemon:
         self.exit_code: int | None = None
         self._instance = instance
         self._terminal = Terminal()
-        offset_ns = measure_epoch_offset_ns()
+        self._offset_ns = offset_ns = measure_epoch_offset_ns()
         ring = key_ring(config)
         self._few_descriptors = raise_descriptor_limit()
         with contextlib.ExitStack() as undo:
@@ -195,6 +195,7 @@ class Daemon:
         state.event_log.turn(state.config, state.loop)
         if now_s >= state.status_due_s:
             self._look_after_helper()
+            self._follow_clock()
         if (now_s >= state.status_due_s or state.event_log.news) and self.exit_code is None:
             state.status_due_s = now_s + STATUS_S
             state.event_log.news = False
@@ -247,6 +248,14 @@ class Daemon:
         before, self._problem = self._problem, self.release.problem if self.exit_code is None else ""
         if self._problem and not before:
             self.state.tell(EventCode.HELPER_MISSING, self._problem)
+
+    def _follow_clock(self) -> None:
+        """Go ahead with the time of day when it was set, or the computer slept and CLOCK_MONOTONIC with it."""
+        offset_ns = followed_offset_ns(self._offset_ns, measure_epoch_offset_ns())
+        if offset_ns != self._offset_ns:
+            log.warning("the clock went ahead by %.1f s, and timestamps with it", (offset_ns - self._offset_ns) * 1e-9)
+            self._offset_ns = offset_ns
+            self.state.follow_clock(offset_ns)
 
     def _look_for_device(self) -> None:
         """Try again when it is time; that nothing ticks until then is no reason for systemd to intervene."""

@@ -53,6 +53,10 @@ class EventLog:
         self._subscriptions = (time.monotonic(), 0)
         self._flood_due_s = 0.0
 
+    def follow_clock(self, epoch_offset_ns: int) -> None:
+        """Tell times by another offset from now on."""
+        self._offset_ns = epoch_offset_ns
+
     def tell(self, event: LoopEvent, config: LoadedConfig, loop: LoopProcess) -> None:
         """Tell an event.
 

@@ -69,6 +69,12 @@ class DaemonState:
             self.commands.admit(ring)
         self.status_due_s = 0.0
 
+    def follow_clock(self, epoch_offset_ns: int) -> None:
+        """Go on with another difference between CLOCK_MONOTONIC and the time of day."""
+        self.publisher.follow_clock(epoch_offset_ns)
+        self.status.follow_clock(epoch_offset_ns)
+        self.event_log.follow_clock(epoch_offset_ns)
+
     def take_loop(self, loop: LoopProcess) -> None:
         """Go on with the loop that has found the device again."""
         self.loop.close()

@@ -57,6 +57,8 @@ class StatusBuilder:
         self._events_dropped = 0
         self._rate_from = (time.monotonic(), 0)
         self._fault: LoopEvent | None = None
+        self._fault_s = 0.0
+        self._started_s = timestamp_s(time.monotonic_ns(), epoch_offset_ns)
         self._origin_m: dict[str, float] = {}
         self._ticking = False
 
@@ -80,6 +82,10 @@ class StatusBuilder:
         self._flags = Flag.LATCHED if resume.latched else 0
         self._law = resume.law
 
+    def follow_clock(self, epoch_offset_ns: int) -> None:
+        """Tell times by another offset from now on."""
+        self._offset_ns = epoch_offset_ns
+
     def add_dropped(self, ticks: int, events: int) -> None:
         """Count ticks and events that were overwritten before they were fetched."""
         self._ticks_dropped += ticks
@@ -89,6 +95,7 @@ class StatusBuilder:
         """Remember the last fault, and where positions count from."""
         if event.is_fault:
             self._fault = event
+            self._fault_s = timestamp_s(event.deadline_ns, self._offset_ns)
         elif event.code in (EventCode.TARED, EventCode.CALIBRATED):
             self._origin_m = {name: float(value) for name, value in event.fields.items()}
 
@@ -113,6 +120,7 @@ class StatusBuilder:
         self.made = Status(
             version=__version__,
             instance=self._instance,
+            started_timestamp=self._started_s,
             rate_hz=settings.loop.rate_hz,
             measured_rate_hz=self.rate_hz,
             ticks=self._ticks,
@@ -154,7 +162,7 @@ class StatusBuilder:
             next_try_timestamp=self._epoch_s(recovery.next_try_s) if recovery.lost else 0.0,
             fault_code=self._fault.code if self._fault else 0,
             fault_text=self._fault.text if self._fault else "",
-            fault_timestamp=timestamp_s(self._fault.deadline_ns, self._offset_ns) if self._fault else 0.0,
+            fault_timestamp=self._fault_s,
             fault_records=fault_records,
         )
         return self.made

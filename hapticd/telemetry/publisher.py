@@ -73,7 +73,7 @@ class Publisher:
         config: the [telemetry] table.
         ipc_path: where to publish to this computer, None for nowhere; `config.ipc` = false is obeyed as well.
         info: what the device reports besides its position.
-        epoch_offset_ns: `wire.measure_epoch_offset_ns`, measured once at start.
+        epoch_offset_ns: `wire.measure_epoch_offset_ns` at the start.
         ring: the keys that an endpoint for other computers takes; without them there can be none.
 
     Raises:
@@ -140,6 +140,11 @@ class Publisher:
         self._batch_ticks = config.batch_ticks
         self._every_ticks = config.every_ticks
         self._input_every_tick = config.input_every_tick
+
+    def follow_clock(self, epoch_offset_ns: int) -> None:
+        """Stamp by another offset from now on; what waits is of the one before."""
+        self._send_batch()
+        self._offset_ns = epoch_offset_ns
 
     def admit(self, ring: KeyRing) -> None:
         """Take other keys over; a client that is no longer listed is disconnected."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeAlias
 
@@ -206,6 +207,19 @@ Bin 0 counts ticks less than 10 us late, bin i those from edge i-1 to below edge
 """
 
 
+LATE_US = 160
+"""Ticks that started this late or later are called late [us]; an edge of the histogram."""
+
+
+def late_ticks(histogram: Sequence[int]) -> int:
+    """Ticks that were at least `LATE_US` late.
+
+    Args:
+        histogram: bins of `LATE_EDGES_US`; it may be empty.
+    """
+    return sum(histogram[LATE_EDGES_US.index(LATE_US) + 1 :])
+
+
 class LateHistogram:
     """Counts how late ticks were.
 
@@ -238,6 +252,7 @@ class Status:
         every_ticks: one tick in this many is published; the publisher fills it in.
         version: of hapticd.
         instance: name of the daemon's instance.
+        started_timestamp: when the daemon started [s since the epoch].
         rate_hz: ticks a second that the loop is set to [Hz].
         measured_rate_hz: ticks a second that it ran lately [Hz]; 0 while unknown.
         ticks: ticks that it ran.
@@ -287,6 +302,7 @@ class Status:
     every_ticks: int = 1
     version: str = ""
     instance: str = ""
+    started_timestamp: float = 0.0
     rate_hz: float = 0.0
     measured_rate_hz: float = 0.0
     ticks: int = 0

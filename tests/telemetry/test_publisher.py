@@ -292,3 +292,15 @@ def test_the_benchmark_measures_what_subscribers_got() -> None:
     assert (cost.ticks, cost.missing) == (500, 0)
     assert 0.0 < cost.call_us < 1000.0
     assert cost.ratio > 1.0
+
+
+def test_ticks_after_a_step_of_the_clock_are_stamped_by_it_and_those_before_are_not() -> None:
+    with Wire() as wire:
+        subscriber = wire.subscribe("hapticd/position")
+        wire.publisher.publish(ticks(5))
+        wire.publisher.follow_clock(EPOCH_OFFSET_NS + 3_600_000_000_000)
+        wire.publisher.publish(ticks(5, first=5))
+        wire.publisher.flush(sys.maxsize)
+        stamps = [fields["timestamp"] for _, maps in subscriber.waiting() for fields in maps]
+        assert stamps == sorted(stamps)
+        assert stamps[5] - stamps[4] == pytest.approx(3600.001, abs=1e-5)

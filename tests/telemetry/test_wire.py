@@ -215,3 +215,11 @@ def test_events_and_status_keep_their_names_and_lose_no_field() -> None:
         "law": "tdpa", "late_histogram": [1, 2], "nested": {"a": 0}, "invalid": True,
         "timestamp": 0.5, "seq": 9, "schema": wire.SCHEMA, "every_ticks": 10,
     }  # fmt: skip
+
+
+def test_timestamps_follow_a_clock_that_is_set_forward_and_never_one_that_is_set_back() -> None:
+    """S10: after a suspend, or a start before the time was known, they stayed wrong until the daemon's end."""
+    hour_ns = 3_600_000_000_000
+    assert wire.followed_offset_ns(hour_ns, 2 * hour_ns) == 2 * hour_ns
+    assert wire.followed_offset_ns(hour_ns, 0) == hour_ns
+    assert wire.followed_offset_ns(hour_ns, hour_ns + 1_000_000) == hour_ns

@@ -12,13 +12,10 @@ from rich.text import Text
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, bars, plot
 from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Position, Status
-from hapticd.telemetry.records import LATE_EDGES_US
+from hapticd.telemetry.records import LATE_EDGES_US, LATE_US, late_ticks
 
 SILENT_S = 2.5
 """After this silence [s] a daemon counts as gone: it says its status every second."""
-
-LATE_US = 160
-"""Ticks that started this late or later [us] are counted as late; an edge of the histogram."""
 
 _AXIS_STYLES = ("cyan", "magenta", "green")
 _REQUESTED = "red"
@@ -73,7 +70,7 @@ def one_line(known: ScreenState) -> str:
         f"{_state(status)[0].lower():8}",
         status.law,
         f"{status.measured_rate_hz:.1f} Hz",
-        f"late {late_ticks(status)}",
+        f"late {late_ticks(status.late_histogram)}",
         f"skipped {status.overruns}",
     ]
     if known.position:
@@ -88,11 +85,6 @@ def one_line(known: ScreenState) -> str:
     if known.energy:
         parts += [f"energy {si(known.energy.energy_j, 'J')}", f"generated {si(known.energy.generated_j, 'J')}"]
     return "  ".join(parts)
-
-
-def late_ticks(status: Status) -> int:
-    """Ticks at least `LATE_US` late."""
-    return sum(status.late_histogram[LATE_EDGES_US.index(LATE_US) + 1 :])
 
 
 def si(value: float, unit: str) -> str:
@@ -163,7 +155,7 @@ def _loop(known: ScreenState, status: Status, width: int) -> Text:
         if width > _NARROW:
             line.append("  late ", _QUIET).append_text(_late_bars(status))
             line.append(" max ", _QUIET).append(si(status.late_max_us * 1e-6, "s"))
-        line.append("  late ticks ", _QUIET).append_text(_count(late_ticks(status), "yellow"))
+        line.append("  late ticks ", _QUIET).append_text(_count(late_ticks(status.late_histogram), "yellow"))
     line.append("  skipped ", _QUIET).append_text(_count(status.overruns, "yellow"))
     lost = status.ring_drops + known.lost
     if lost:

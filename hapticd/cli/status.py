@@ -1,0 +1,76 @@
+"""`hapticd status`: every daemon of this computer in a line or two, or as JSON."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import typer
+
+from hapticd.client.commands import command
+from hapticd.errors import InstanceError
+from hapticd.paths import living_instances
+from hapticd.telemetry.records import late_ticks
+
+SCHEMA = 1
+"""Version of what `--json` prints."""
+
+
+def status(
+    instance: Annotated[str | None, typer.Option("--instance", "-i", help="Only this daemon.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Say how every daemon of this computer is.
+
+    Since when it runs, its law, whether it is armed, its rate, how many ticks were late, its faults. Exits with 1 when
+    none runs, or one does not answer.
+
+    Example: hapticd status --json
+    """
+    names = living_instances() if instance is None else [instance]
+    said = [_asked(name) for name in names]
+    if as_json:
+        typer.echo(json.dumps({"schema": SCHEMA, "instances": said}, indent=2))
+    else:
+        for one in said:
+            typer.echo("\n".join(_lines(one)))
+        if not said:
+            typer.echo("no daemon runs: start one with `hapticd run` or `systemctl start hapticd`", err=True)
+    raise typer.Exit(0 if said and all("problem" not in one for one in said) else 1)
+
+
+def _asked(name: str) -> dict[str, Any]:
+    try:
+        status: dict[str, Any] = command("status", name)["status"]
+    except InstanceError as error:
+        return {"name": name, "problem": str(error)}
+    histogram = status["late_histogram"]
+    return {"name": name, "late_share": late_ticks(histogram) / (sum(histogram) or 1), "status": status}
+
+
+def _lines(one: Mapping[str, Any]) -> list[str]:
+    if "problem" in one:
+        return [f"{one['name']}: {one['problem']}"]
+    status = one["status"]
+    mode = "stopped by a fault" if status["latched"] else "armed" if status["armed"] else "disarmed"
+    if status["device_lost_timestamp"]:
+        mode = "no device"
+    parts = (
+        mode,
+        f"law {status['law']}" + (" (failed, damping instead)" if status["fallback"] else ""),
+        f"{status['measured_rate_hz']:.0f} of {status['rate_hz']:g} Hz",
+        f"{100.0 * one['late_share']:.2g} % late",
+        f"since {_shown(status['started_timestamp'])}",
+        status["device"] + (" (simulated)" if status["simulated"] else ""),
+    )
+    lines = [f"{one['name']}: {', '.join(parts)}"]
+    if status["fault_code"]:
+        lines.append(f"  fault {status['fault_code']} at {_shown(status['fault_timestamp'])}: {status['fault_text']}")
+    lines.extend(f"  {warning}" for warning in status["warnings"])
+    return lines
+
+
+def _shown(timestamp: float) -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(timestamp))

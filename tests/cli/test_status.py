@@ -1,0 +1,52 @@
+"""`hapticd status` finds every daemon that lives and says of each what an engineer asks first."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from tests.daemon.running import HAPTICD, Daemon, wait_until
+
+
+def status(runtime: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(runtime)}
+    return subprocess.run([HAPTICD, "status", *arguments], env=environment, capture_output=True, text=True, check=False)
+
+
+def test_every_daemon_that_lives_is_shown_and_what_a_killed_one_left_is_not(tmp_path: Path) -> None:
+    began_s = time.time()
+    with Daemon("").wait_ready() as daemon:
+        runtime = daemon.directory / "run"
+        (runtime / "killed").mkdir()
+        (runtime / "killed" / "lock").write_text("4711\n")
+        environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(runtime), "HAPTICD_STATE_DIR": str(tmp_path)}
+        config = tmp_path / "left.toml"
+        config.write_text('[controller]\nlaw = "tdpa"\n')
+        with subprocess.Popen(
+            [HAPTICD, "run", "--config", str(config), "--instance", "left"], env=environment, stderr=subprocess.DEVNULL
+        ) as left:
+            try:
+                wait_until((runtime / "left/control").exists, "the other daemon")
+                shown = json.loads(status(runtime, "--json").stdout)
+                one, other = shown["instances"]
+                assert (shown["schema"], one["name"], other["name"]) == (1, "default", "left")
+                assert (one["status"]["law"], other["status"]["law"]) == ("energy-cycle", "tdpa")
+                assert began_s - 1.0 < one["status"]["started_timestamp"] < time.time()
+                assert 0.0 <= one["late_share"] <= 1.0
+                plain = status(runtime)
+                assert plain.returncode == 0
+                assert plain.stdout.startswith("default: armed, law energy-cycle, ")
+                assert "\nleft: " in plain.stdout
+                assert status(runtime, "--instance", "left").stdout.startswith("left: ")
+            finally:
+                left.send_signal(signal.SIGTERM)
+
+
+def test_without_a_daemon_it_says_how_to_start_one(tmp_path: Path) -> None:
+    done = status(tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "hapticd run" in done.stderr
