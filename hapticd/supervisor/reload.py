@@ -36,6 +36,10 @@ CLOSE_S = 1.0
 """How long a law that is being imported may hold up the end of the daemon [s]."""
 
 
+CHECK_S = 120.0
+"""How long a law may take to be imported before the file that names it counts as one that cannot be used [s]."""
+
+
 class Reload:
     """Takes the file over, when somebody asks or, where the file says so, when it is saved; one at a time.
 
@@ -65,7 +69,9 @@ class Reload:
         if self._reading is not None:
             read_now = self._reading.outcome
             if read_now is None:
-                return
+                if time.monotonic() < self._reading.give_up_s:
+                    return
+                read_now = HapticdError(f"{state.config.path}: could not be checked within {CHECK_S:g} s")
             answers, self._answers, self._reading = self._answers, [], None
             if isinstance(read_now, HapticdError):
                 self._refuse(str(read_now), answers)
@@ -145,11 +151,13 @@ class _Reading(threading.Thread):
 
     Attributes:
         outcome: what it says, or why it cannot be used; None as long as that is not known.
+        give_up_s: until when there should be one, on CLOCK_MONOTONIC [s].
     """
 
     def __init__(self, path: Path) -> None:
         super().__init__(name="reload", daemon=True)
         self.outcome: LoadedConfig | HapticdError | None = None
+        self.give_up_s = time.monotonic() + CHECK_S
         self._path = path
         self.start()
 
