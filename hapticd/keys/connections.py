@@ -15,6 +15,7 @@ import socket as sockets
 import struct
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
@@ -34,6 +35,7 @@ _QUIET_S = 60.0  # between two lines in the log about the same endpoint
 _LOOK_MS = 1000
 _NEWS = zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED | zmq.EVENT_CLOSED | zmq.EVENT_MONITOR_STOPPED
 _MONITOR = "inproc://connections"
+_CREDENTIALS = "iII"
 
 log = logging.getLogger("hapticd")
 
@@ -164,17 +166,10 @@ def local_peer(descriptor: int) -> str:
     Args:
         descriptor: of the connection, as ZeroMQ tells with a message.
     """
-    with contextlib.suppress(OSError):
-        held = os.dup(descriptor)
-        try:
-            connection = sockets.socket(fileno=held)
-            size = struct.calcsize("iII")
-            process, user, _group = struct.unpack(
-                "iII", connection.getsockopt(sockets.SOL_SOCKET, sockets.SO_PEERCRED, size)
-            )
-            connection.detach()
-        finally:
-            os.close(held)
+    with contextlib.suppress(OSError), _held(descriptor) as connection:
+        size = struct.calcsize(_CREDENTIALS)
+        said = connection.getsockopt(sockets.SOL_SOCKET, sockets.SO_PEERCRED, size)
+        process, user, _group = struct.unpack(_CREDENTIALS, said)
         return f"user {user}, process {process}"
     return ""
 
@@ -186,17 +181,24 @@ def _enough(limit: int) -> bool:
 def _shut(descriptor: int, endpoint: str) -> None:
     """End a connection; ZeroMQ sees that and closes it.
 
-    The number may be another thing's by now, so it is held, and only what belongs to the endpoint is ended.
+    The number may be another thing's by now, so only what belongs to the endpoint is ended.
     """
-    with contextlib.suppress(OSError):
-        held = os.dup(descriptor)
-        try:
-            connection = sockets.socket(fileno=held)
-            if _is_at(connection.getsockname(), endpoint):
-                connection.shutdown(sockets.SHUT_RDWR)
-            connection.detach()
-        finally:
-            os.close(held)
+    with contextlib.suppress(OSError), _held(descriptor) as connection:
+        if _is_at(connection.getsockname(), endpoint):
+            connection.shutdown(sockets.SHUT_RDWR)
+
+
+@contextlib.contextmanager
+def _held(descriptor: int) -> Iterator[sockets.socket]:
+    """What a descriptor leads to now, whatever becomes of the descriptor."""
+    own = os.dup(descriptor)
+    try:
+        connection = sockets.socket(fileno=own)
+    except OSError:  # no socket any more
+        os.close(own)
+        raise
+    with connection:
+        yield connection
 
 
 def _is_at(name: object, endpoint: str) -> bool:

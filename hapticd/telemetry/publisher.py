@@ -33,6 +33,7 @@ BATCH_NS = 20_000_000
 _MOST_SUBSCRIPTIONS_AT_ONCE = 1000
 _LAST_WORDS_MS = 100
 _LARGEST_REQUEST = 128  # bytes of a subscription; ZeroMQ keeps forty times that for each
+_MOST_UNREAD = 10  # subscriptions of a client: ZeroMQ keeps what it has read before it can be refused
 _LARGEST_WITH_KEYS = 1024  # the handshake is longer, and who it lets in is listed
 
 
@@ -117,6 +118,7 @@ class Publisher:
             self._socket.setsockopt(zmq.SNDHWM, config.send_high_water)
             self._socket.setsockopt(zmq.LINGER, 0)
             self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
+            self._socket.setsockopt(zmq.RCVHWM, _MOST_UNREAD)
             if config.ipc and ipc_path is not None:
                 self._bind_ipc(ipc_path)
             expect_signs_of_life(self._socket)

@@ -15,6 +15,7 @@ import zmq
 
 from hapticd.client.commands import command
 from hapticd.keys.connections import MOST_CONNECTIONS
+from hapticd.keys.store import KeyDirectory
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
 
 CONNECTIONS = 1500
@@ -57,19 +58,22 @@ def resident_mb(pid: int) -> float:
     return int(next(line for line in status.splitlines() if line.startswith("VmRSS")).split()[1]) / 1024.0
 
 
-@pytest.mark.parametrize("endpoint", ["port", "telemetry", "control"])
+@pytest.mark.parametrize("endpoint", ["port", "keyed port", "telemetry", "control"])
 def test_idle_connections_neither_end_the_daemon_nor_keep_disarm_away(
-    endpoint: str, monkeypatch: pytest.MonkeyPatch, record_property: Callable[[str, object], None]
+    endpoint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record_property: Callable[[str, object], None]
 ) -> None:
     """S1: a thousand used up the descriptors, and the next client of the control socket met an abort in libzmq."""
     port = free_port()
-    config = f'[telemetry]\ntcp = "tcp://127.0.0.1:{port}"\n'
+    table = "control" if endpoint == "keyed port" else "telemetry"  # commands take keys on this computer too
+    monkeypatch.setenv("HAPTICD_KEYS_DIR", str(tmp_path))
+    KeyDirectory(tmp_path).make()
+    config = f'[{table}]\ntcp = "tcp://127.0.0.1:{port}"\n'
     with Daemon(config, prefix=FEW_DESCRIPTORS) as daemon:
         daemon.wait_ready()
         monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(daemon.directory / "run"))
         command("arm")
         run = daemon.directory / "run/default"
-        where = ("127.0.0.1", port) if endpoint == "port" else str(run / endpoint)
+        where = ("127.0.0.1", port) if endpoint.endswith("port") else str(run / endpoint)
         before = descriptors(daemon.process.pid)
         with flood(where, CONNECTIONS), Subscriber(daemon.endpoint, "hapticd/status") as subscriber:
             asked_s = time.monotonic()

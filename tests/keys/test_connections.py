@@ -1,0 +1,108 @@
+"""A bound on connections: what it promises of ZeroMQ, and whom it drops."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import socket as sockets
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import zmq
+
+from hapticd.keys import connections
+from hapticd.keys.connections import DESCRIPTORS, ConnectionBound, local_peer
+from tests.daemon.test_flood import descriptors, flood
+from tests.telemetry.sockets import wait_until
+
+MOST = 20
+
+
+@contextlib.contextmanager
+def bounded() -> Iterator[tuple[ConnectionBound, zmq.Socket[bytes], tuple[str, int]]]:
+    """A socket with a bound, and where it listens."""
+    context = zmq.Context()
+    socket = context.socket(zmq.ROUTER)
+    bound = ConnectionBound(socket, MOST)
+    socket.bind("tcp://127.0.0.1:0")
+    port = int(socket.getsockopt_string(zmq.LAST_ENDPOINT).rpartition(":")[2])
+    try:
+        yield bound, socket, ("127.0.0.1", port)
+    finally:
+        socket.close(0)
+        bound.close()
+        context.term()
+
+
+def taken() -> int:
+    return descriptors(os.getpid())
+
+
+def test_nothing_grows_while_the_thread_stands_still() -> None:
+    """It is why so many descriptors are enough: ZeroMQ takes no further connection until its news are read."""
+    with bounded() as (bound, _, where):
+        before = taken()
+        count = 2600
+        bound._lock.acquire()
+        try:
+            # More cannot be opened: those that ZeroMQ does not take wait in the kernel, which holds a hundred.
+            with flood(where, count - 600):
+                held = taken() - before - (count - 600)
+        finally:
+            bound._lock.release()
+        assert MOST < held <= DESCRIPTORS // 4
+        wait_until(lambda: taken() <= before, "descriptors again")
+
+
+def test_the_oldest_that_say_nothing_are_dropped() -> None:
+    with bounded() as (_, _, where), flood(where, 2 * MOST) as opened:
+        wait_until(lambda: all(ended(one) for one in opened[:MOST]), "the end of the oldest")
+        assert not any(ended(one) for one in opened[MOST:])
+
+
+def test_who_says_what_makes_no_sense_is_dropped_in_the_end_and_no_other() -> None:
+    with bounded() as (bound, socket, where), zmq.Context() as context:
+        odd, other = (context.socket(zmq.DEALER) for _ in range(2))
+        with odd, other:
+            for client in (odd, other):
+                client.setsockopt(zmq.LINGER, 0)
+                client.setsockopt(zmq.RECONNECT_IVL, -1)
+                client.connect(f"tcp://{where[0]}:{where[1]}")
+            odd.send(b"odd")
+            who, frame = socket.recv_multipart(copy=False)
+            said = [bound.odd(int(frame.get(zmq.SRCFD))) for _ in range(connections.MOST_ODD + 1)]
+            assert said == [False] * connections.MOST_ODD + [True]
+            other.send(b"still here")
+            assert socket.recv_multipart()[1] == b"still here"
+            assert who.bytes
+
+
+def test_the_kernel_knows_who_is_at_the_other_end(tmp_path: Path) -> None:
+    ours, theirs = sockets.socketpair(sockets.AF_UNIX)
+    with ours, theirs:
+        assert local_peer(ours.fileno()) == f"user {os.geteuid()}, process {os.getpid()}"
+    with (tmp_path / "file").open("w") as file:
+        assert local_peer(file.fileno()) == ""
+
+
+def test_few_descriptors_are_said_when_no_more_can_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (1024, 1024))
+    monkeypatch.setattr(resource, "setrlimit", lambda *_: None)
+    assert "only 1024 file descriptors" in connections.raise_descriptor_limit()
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (1024, resource.RLIM_INFINITY))
+    assert connections.raise_descriptor_limit() == ""
+
+
+def ended(connection: sockets.socket) -> bool:
+    """Whether the other side has closed it; the greeting that ZeroMQ sends first is passed over."""
+    connection.setblocking(False)
+    try:
+        while connection.recv(4096):
+            pass
+    except BlockingIOError:
+        return False
+    except ConnectionError:
+        return True
+    return True
