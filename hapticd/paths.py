@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import fcntl
 import os
 import re
@@ -170,7 +169,7 @@ def instance_directories(instance: str) -> list[Path]:
 
 
 def living_instances() -> list[str]:
-    """Every instance that lives on this computer and is open to this user, as `locate` takes its name."""
+    """Every instance of this computer that lives, as `locate` takes its name; those closed to this user too."""
     given = os.environ.get("HAPTICD_RUNTIME_DIR")
     if given:
         return [directory.name for directory in _living(Path(given))]
@@ -180,13 +179,18 @@ def living_instances() -> list[str]:
 
 
 def _living(place: Path) -> list[Path]:
-    living = []
-    with contextlib.suppress(FileNotFoundError, PermissionError):
-        for directory in sorted(place.iterdir()):
-            with contextlib.suppress(PermissionError):
-                if _INSTANCE.fullmatch(directory.name) and alive(directory):
-                    living.append(directory)
-    return living
+    try:
+        directories = sorted(place.iterdir())
+    except (FileNotFoundError, PermissionError):
+        return []
+    return [directory for directory in directories if _INSTANCE.fullmatch(directory.name) and _may_live(directory)]
+
+
+def _may_live(directory: Path) -> bool:
+    try:
+        return alive(directory)
+    except PermissionError:
+        return True
 
 
 def telemetry_endpoint(instance: str = DEFAULT_INSTANCE) -> str:

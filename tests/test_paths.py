@@ -14,7 +14,7 @@ import pytest
 
 from hapticd import paths
 from hapticd.errors import ConfigError, InstanceError
-from hapticd.paths import locate, make_runtime_directory, runtime_directory, telemetry_endpoint
+from hapticd.paths import living_instances, locate, make_runtime_directory, runtime_directory, telemetry_endpoint
 from hapticd.supervisor.lock import InstanceLock
 
 
@@ -128,6 +128,31 @@ def test_a_directory_that_somebody_else_made_in_tmp_is_not_trusted(user: Path, m
             locate("telemetry")
         system = sockets_of(user / "run" / "hapticd" / "default")
         assert locate("telemetry") == system
+
+
+@pytest.mark.usefixtures("not_root")
+def test_every_instance_that_lives_or_is_closed_to_this_user_is_listed(
+    user: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(user / "session"))
+    run, own = user / "run" / "hapticd", user / "session" / "hapticd"
+    for dead in (run / "dead", own / "dead"):
+        dead.mkdir(parents=True)
+        (dead / "lock").touch()
+    look = paths.alive
+
+    def closed(directory: Path) -> bool:
+        if directory.name == "closed":
+            raise PermissionError
+        return look(directory)
+
+    monkeypatch.setattr(paths, "alive", closed)
+    (run / "closed").mkdir()
+    assert living_instances() == ["system/closed"]
+    with living_in(run / "left"), living_in(own / "left"):
+        assert living_instances() == ["system/closed", "system/left", "user/left"]
+    with pytest.raises(InstanceError, match="not open to you"):
+        locate("control", "system/closed")
 
 
 def test_a_daemon_starts_although_a_client_is_just_looking(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
