@@ -82,6 +82,7 @@ class Contact:
         "_contact_n",
         "_moved_m",
         "_resolution_m",
+        "_touched",
         "applied_n",
         "blend_from_n",
         "blend_from_x_m",
@@ -114,6 +115,7 @@ class Contact:
         self.damping_n_s_per_m = 0.0
         self.felt_mass_kg = 0.0
         self.blending = False
+        self._touched = True
         self._moved_m = 0.0
         self._contact_n = 0.0
         self._applied_contact_n = 0.0
@@ -125,6 +127,7 @@ class Contact:
         self.x_m = self.wall.outward * (position_m - self.wall.position_m)
         self.in_contact = self.x_m < 0.0
         self.blending = False
+        self._touched = True
         self.force_n = self.requested_n = 0.0
         self.applied_n = self._applied_contact_n = self._applied_spring_n = 0.0
         self.tick.applied_n = self.tick.applied_contact_n = 0.0
@@ -166,7 +169,7 @@ class Contact:
         Outside the wall there is nothing to blend: what comes then comes from the device's own motion.
 
         Args:
-            ticks: how many it takes.
+            ticks: how many periods it takes.
             gain: the guard's gain that the next force will be multiplied by.
             limit_n: the guard's limit for one contact [N].
         """
@@ -184,8 +187,6 @@ class Contact:
         """
         wall = self.wall
         tick = self.tick
-        if wall.changes_left:
-            wall.count_tick()
         x_m = wall.outward * (position_m - wall.position_m)
         tick.moved_m = self._moved_m = x_m - self.x_m
         tick.x_m = self.x_m = x_m
@@ -199,8 +200,11 @@ class Contact:
             tick.in_contact = self.in_contact = False
             tick.contact_n = self._contact_n = tick.spring_n = wall.spring_n = 0.0
 
-    def act(self) -> None:
+    def act(self, periods: float) -> None:
         """Ask the law for its force.
+
+        Args:
+            periods: time since the last tick, in periods of the loop, for a blend.
 
         Raises:
             BaseException: whatever the law raises.
@@ -225,7 +229,16 @@ class Contact:
         if force_n.__class__ is not float or not -MOST < force_n < MOST:  # NaN fails every comparison
             force_n = _number(force_n)
         self.requested_n = force_n
-        self.force_n = blended(self, self.x_m, force_n) if self.blending else force_n
+        self.force_n = blended(self, self.x_m, force_n, periods) if self.blending else force_n
+
+    def hold(self, periods: float) -> None:
+        """Stay with what the law asked for last, at a tick without a new sample; a blend goes on.
+
+        Args:
+            periods: time since the last tick, in periods of the loop.
+        """
+        if self.blending:
+            self.force_n = blended(self, self.x_m, self.requested_n, periods)
 
     def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
         """Enter the tick into the books and remember what is applied from now on.
@@ -237,18 +250,22 @@ class Contact:
             share: how much of the force the guard let through, 0 to 1.
             gain: how much of that a release has left, 0 to 1.
             limit_n: the guard's limit for one contact [N].
-            dt_s: time since the last sample [s].
+            dt_s: time since the last sample; 0: this is the same once more, and the books wait for the next [s].
         """
         wall = self.wall
-        self.ledger.update(
-            self._moved_m,
-            self.applied_n,
-            self._applied_spring_n,
-            gain * wall.stored_j(self.x_m, limit_n),
-            self.in_contact,
-            self.damping_n_s_per_m,
-            dt_s,
-        )
+        in_contact = self.in_contact
+        touched = in_contact or self.applied_n != 0.0
+        if dt_s > 0.0 and (touched or self._touched):  # once more after the touch; then nothing changes any more
+            self._touched = touched
+            self.ledger.update(
+                self._moved_m,
+                self.applied_n,
+                self._applied_spring_n,
+                gain * wall.stored_j(self.x_m, limit_n),
+                in_contact,
+                self.damping_n_s_per_m,
+                dt_s,
+            )
         contact_n = self._contact_n
         if self.blending:
             contact_n += self.force_n - self.requested_n  # so that what is left is the law's own part

@@ -30,8 +30,8 @@ class BlendFields:
     """The scalar fields that a blend of one contact's force keeps, `start_blend` to `blended`."""
 
     blending: bool
-    blend_tick: float  # ticks done
-    blend_ticks: float  # ticks from the old force to the new one
+    blend_tick: float  # periods done, -1 before the first tick
+    blend_ticks: float  # periods from the old force to the new one
     blend_from_n: float  # the old force, held
     blend_from_x_m: float  # where it was applied
     blend_limit_n: float  # largest force of one contact
@@ -45,20 +45,20 @@ def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: in
         from_n: force applied now, outward, within the limit [N].
         x_m: where, relative to the wall, < 0 [m].
         limit_n: largest force that one contact may come to [N].
-        ticks: how many it takes.
+        ticks: how many periods it takes.
     """
     state.blending = True
-    state.blend_tick = 0.0
+    state.blend_tick = -1.0
     state.blend_ticks = float(ticks)
     state.blend_from_n = from_n
     state.blend_from_x_m = x_m
     state.blend_limit_n = limit_n
 
 
-def blended(state: Any, x_m: float, force_n: float) -> float:
+def blended(state: Any, x_m: float, force_n: float, periods: float) -> float:
     """The force of one tick of a transition [N]; call it once a tick while `state.blending` and in contact.
 
-        F = (1 - w) F_old min(1, x / x_old) + w F_new,     w = 0, 1/N, 2/N ... 1
+        F = (1 - w) F_old min(1, x / x_old) + w F_new,     w = 0, 1/N, 2/N ... 1 where no tick is late
 
     The old force is held, and let out with the depth, so that nothing is left of it where contact ends. The new one
     is taken up to the limit only: a wall that asks for ten times the limit must not come in ten times as fast. When
@@ -70,9 +70,10 @@ def blended(state: Any, x_m: float, force_n: float) -> float:
         state: the fields of `BlendFields`.
         x_m: position relative to the wall, < 0 [m].
         force_n: the new force [N].
+        periods: time since the last tick, in periods of the loop; more than one where deadlines were skipped.
     """
-    weight: float = state.blend_tick / state.blend_ticks
-    state.blend_tick += 1.0
+    state.blend_tick = done = state.blend_tick + periods
+    weight: float = done / state.blend_ticks if done > 0.0 else 0.0
     reach_n: float = state.blend_limit_n
     if weight >= 1.0:
         if weight >= 2.0 or -reach_n <= force_n <= reach_n:
@@ -265,10 +266,27 @@ class Guard:
         if moving:
             self._take_limits()
         if self.mode is Mode.RELEASING:
-            self.gain -= dt_s / self._ramp_s if self._ramp_s > dt_s else 1.0
-            if self.gain <= 0.0:
+            self.gain = let_out(self.gain, self._ramp_s, dt_s)
+            if self.gain == 0.0:
                 self.drop()
         self._changing = moving or self.mode is Mode.RELEASING
+
+
+def let_out(gain: float, ramp_s: float, dt_s: float) -> float:
+    """What a ramp to zero leaves of a force after a tick.
+
+    What is written now is held until the next write, so that the ramp is over already where that one would come too
+    late.
+
+    Args:
+        gain: what it left before, 0 to 1.
+        ramp_s: time from full force to none [s].
+        dt_s: time since the last tick, and as far as is known until the next [s].
+    """
+    if ramp_s <= dt_s:
+        return 0.0
+    gain -= dt_s / ramp_s
+    return gain if gain * ramp_s >= dt_s * (1.0 - 1e-6) else 0.0
 
 
 def limits(safety: SafetyConfig, info: DeviceInfo) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ import math
 from hapticd.config.models import VelocityConfig
 from hapticd.device import DeviceInfo, Sample
 from hapticd.errors import ConfigError
-from hapticd.tick.velocity import Estimator, make_estimator
+from hapticd.tick.velocity import Difference, Estimator, make_estimator
 
 LEAST_S = 1e-9
 MOST_S = 1.0
@@ -32,10 +32,12 @@ class Motion:
     Attributes:
         position_m: counted from the origin, one element an axis, always the same list [m].
         velocity_m_per_s: one element an axis, always the same list [m/s].
-        speed_squared: of the last sample that made sense, over all axes [m^2/s^2].
-        dt_s: time between the last two samples, as laws reckon with it [s].
+        watches_speed: whether `speed_squared` is kept.
+        speed_squared: from the last two samples that made sense, whatever the estimator, over all axes [m^2/s^2].
+        dt_s: time between the last two samples, as laws reckon with it; 0 when the last one was a repeat [s].
         origin_m: where the device places the point that positions count from, one element an axis [m].
         repeated: how many samples in a row came with the device time or count of the one before.
+        repeated_s: for how long they have come [s].
 
     Raises:
         ConfigError: velocity is to come from a device that does not measure it.
@@ -44,7 +46,9 @@ class Motion:
     __slots__ = (
         "_axes",
         "_bounds_m",
+        "_differences",
         "_estimators",
+        "_filtered",
         "_has_clock",
         "_has_sequence",
         "_period_s",
@@ -55,8 +59,10 @@ class Motion:
         "origin_m",
         "position_m",
         "repeated",
+        "repeated_s",
         "speed_squared",
         "velocity_m_per_s",
+        "watches_speed",
     )
 
     def __init__(self, velocity: VelocityConfig, info: DeviceInfo, period_s: float) -> None:
@@ -69,9 +75,13 @@ class Motion:
         self.dt_s = period_s
         self.origin_m = [0.0] * axes
         self.repeated = 0
+        self.repeated_s = 0.0
         self._axes = range(axes)
         self._period_s = period_s
         self._estimators: list[Estimator] = [make_estimator(velocity, info.resolution_m) for _ in range(axes)]
+        self.watches_speed = False
+        self._filtered = not isinstance(self._estimators[0], Difference)
+        self._differences = [Difference() for _ in range(axes)]
         self._bounds_m = [
             (max(low - MARGIN * (high - low), -MOST_M), min(high + MARGIN * (high - low), MOST_M))
             for low, high in info.workspace_m
@@ -86,20 +96,20 @@ class Motion:
         """Begin at a sample, at rest; False when it makes no sense, and it is not known where the device is."""
         self._time_ns = sample.time_ns
         self._sequence = sample.sequence
-        # A NaN is nowhere.
-        if not all(low <= at <= high for at, (low, high) in zip(sample.position_m, self._bounds_m, strict=True)):
+        if not self._is_possible(sample):
             return False
         for axis in self._axes:
             self.position_m[axis] = position_m = sample.position_m[axis]
-            self._estimators[axis].start(position_m)
+            self._stand(axis, position_m)
         return True
 
-    def see(self, sample: Sample, clock_dt_s: float, at_rest: bool) -> bool:
-        """Take a sample in; False when it makes no sense.
+    def see(self, sample: Sample, clock_dt_s: float, passed_s: float, at_rest: bool) -> bool:
+        """Take a sample in; False when it makes no sense. A repeat changes nothing but the count of repeats.
 
         Args:
             sample: the newest state of the device.
             clock_dt_s: time since the last tick on this computer's clock, for devices without one [s].
+            passed_s: time that a tick counts for where its device has no news [s].
             at_rest: forget what came before: the device stands where this sample says.
         """
         if self._has_clock:
@@ -109,15 +119,20 @@ class Motion:
         else:
             repeats = self._has_sequence and sample.sequence == self._sequence
             self._sequence = sample.sequence
-            # The same sample once more: as on a device's own clock, time stands still until there is news.
             self._waited_s += clock_dt_s
-            dt_s = 0.0 if repeats else self._waited_s
+            dt_s = 0.0
             if not repeats:
+                dt_s = self._waited_s
                 self._waited_s = 0.0
         if repeats:
             self.repeated += 1
+            self.repeated_s += passed_s
+            if not at_rest:
+                self.dt_s = 0.0
+                return self._is_possible(sample)
         elif self.repeated:
             self.repeated = 0
+            self.repeated_s = 0.0
         if LEAST_S <= dt_s < MOST_S:
             self.dt_s = dt_s
         else:
@@ -125,6 +140,7 @@ class Motion:
             if not MOST_S <= dt_s < math.inf:
                 dt_s = 0.0
         speed_squared = 0.0
+        watches_speed = self.watches_speed
         origin_m = self.origin_m
         for axis in self._axes:
             position_m = sample.position_m[axis]
@@ -134,20 +150,41 @@ class Motion:
             position_m -= origin_m[axis]
             estimator = self._estimators[axis]
             if at_rest:
-                estimator.start(position_m)
+                self._stand(axis, position_m)
             velocity_m_per_s = estimator.update(position_m, dt_s, sample.velocity_m_per_s[axis])
             if not -MOST_M_PER_S < velocity_m_per_s < MOST_M_PER_S:
                 return False
             self.position_m[axis] = position_m
             self.velocity_m_per_s[axis] = velocity_m_per_s
-            speed_squared += velocity_m_per_s * velocity_m_per_s
+            if watches_speed:
+                if self._filtered:
+                    velocity_m_per_s = self._differences[axis].update(position_m, dt_s, 0.0)
+                speed_squared += velocity_m_per_s * velocity_m_per_s
         self.speed_squared = speed_squared
         return True
+
+    def watch_speed(self) -> None:
+        """Keep `speed_squared` from the next sample on."""
+        if not self.watches_speed:
+            self.watches_speed = True
+            for axis in self._axes:
+                self._differences[axis].start(self.position_m[axis])
 
     def move_origin(self, origin_m: list[float]) -> None:
         """Count positions from another point, and stand there at rest [m]."""
         for axis in self._axes:
             self.position_m[axis] += self.origin_m[axis] - origin_m[axis]
             self.velocity_m_per_s[axis] = 0.0
-            self._estimators[axis].start(self.position_m[axis])
+            self._stand(axis, self.position_m[axis])
         self.origin_m = origin_m
+
+    def _stand(self, axis: int, position_m: float) -> None:
+        self._estimators[axis].start(position_m)
+        self._differences[axis].start(position_m)
+
+    def _is_possible(self, sample: Sample) -> bool:
+        """Whether the device may be there; a NaN is nowhere."""
+        for position_m, (low_m, high_m) in zip(sample.position_m, self._bounds_m, strict=True):
+            if not low_m <= position_m <= high_m:
+                return False
+        return True

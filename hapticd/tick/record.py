@@ -53,7 +53,7 @@ class TickRecord:
         deadline_ns: CLOCK_MONOTONIC time that the tick was due [ns].
         late_us: how late it started [us].
         busy_us: how long its body took [us].
-        dt_s: time since the tick before, on the device's clock where it has one [s].
+        dt_s: time since the sample before, on the device's clock where it has one; 0 at a repeat [s].
         skipped: deadlines skipped so far.
         flags: state bits.
         law: index of the law activation, counted up at each switch.

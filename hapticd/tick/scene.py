@@ -30,12 +30,12 @@ class Wall:
         position_m: the plane on the axis [m].
         stiffness_n_per_m, damping_n_s_per_m: in force now.
         spring_n: the spring's part of the last force [N].
-        changes_left: whether a change is still to come; then `count_tick` must be called.
+        changes_left: whether a change is still to come; then `pass_time` must be called at each tick.
     """
 
     __slots__ = (
         "_changes",
-        "_ticks",
+        "_periods",
         "axis",
         "changes_left",
         "config",
@@ -54,20 +54,27 @@ class Wall:
         self.stiffness_n_per_m = config.stiffness_n_per_m
         self.damping_n_s_per_m = config.damping_n_s_per_m
         self.spring_n = 0.0
-        self._ticks = 0
+        self._periods = -1.0  # since the first tick
         self._changes = [(first_tick(change.at_s, period_s), change) for change in config.changes]
         self.changes_left = bool(self._changes)
 
-    def count_tick(self) -> None:
-        """Bring changes into force whose time has come."""
-        while self._changes and self._ticks >= self._changes[0][0]:
+    def pass_time(self, periods: float) -> bool:
+        """Bring changes into force whose time has come; whether there were any.
+
+        Args:
+            periods: time since the last tick, in periods of the loop.
+        """
+        self._periods += periods
+        changed = False
+        while self._changes and self._periods >= self._changes[0][0]:
             _, change = self._changes.pop(0)
+            changed = True
             if change.stiffness_n_per_m is not None:
                 self.stiffness_n_per_m = change.stiffness_n_per_m
             if change.damping_n_s_per_m is not None:
                 self.damping_n_s_per_m = change.damping_n_s_per_m
         self.changes_left = bool(self._changes)
-        self._ticks += 1
+        return changed
 
     def force(self, x_m: float, velocity_m_per_s: float) -> float:
         """Force on the device inside the wall, positive pushes out [N].

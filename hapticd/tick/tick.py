@@ -15,14 +15,19 @@ from hapticd.tick.contact import Contact, RunningLaw, heirs
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
-from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, limits
+from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, let_out, limits
 from hapticd.tick.motion import Motion
 from hapticd.tick.scene import Wall, compile_walls
 
-FROZEN_TICKS = 20
-"""Samples in a row with the same device time or count after which a device counts as frozen."""
+FROZEN_S = 0.02
+FROZEN_SAMPLES = 20
+LEAST_REPEATS = 3
+"""A device is frozen that has had nothing new for this time [s], and for this many samples of its nominal rate, and at
+this many reads in a row: whether loop or device is the slower one."""
 
 _IMPOSSIBLE = "the device reported a position that is not possible"
+_LOST = "the device does not know any more where it is"
+_DISARMED, _ARMED = Mode.DISARMED, Mode.ARMED  # Python 3.11 takes 0.1 us to look a member up, each time
 _MODE_FLAGS = (0, int(Flag.ARMED), int(Flag.RELEASING))  # in the order of guard.Mode
 _LIMITED = int(Flag.LIMITED)
 _LATCHED = int(Flag.LATCHED)
@@ -84,15 +89,20 @@ class ControlTick:
         self.fault_text = ""
         self._last_fault = 0
         self._axes = range(axes)
+        self._simulated = info.simulated
+        # Less half a sample, so that no clock's rounding decides.
+        self._frozen_s = max(FROZEN_S, FROZEN_SAMPLES / info.nominal_rate_hz) * (1.0 - 0.5 / FROZEN_SAMPLES)
         self._active = self.contacts  # and those that leave
+        self._changing = any(contact.wall.changes_left for contact in self.contacts)
         self._blind = True
         self._excused = False
         self._blind_gain = 0.0
         self._blind_from_n = [0.0] * axes
+        self._watch_speed()
 
     @property
     def ramp_ticks(self) -> int:
-        """Ticks that a ramp takes."""
+        """Ticks that a ramp takes where none is late."""
         return max(1, round(self.ramp_s / self.period_s))
 
     @property
@@ -180,6 +190,7 @@ class ControlTick:
         self.make_law = make
         if safety is not None:
             self.guard.configure(safety, self.info, self.force_n)
+            self._watch_speed()
             self.ramp_s = safety.ramp_s
         for contact in self.contacts:
             if contact not in contacts:
@@ -189,6 +200,7 @@ class ControlTick:
             self._blend(contact)
         self.contacts = contacts
         self._active = contacts + self.leaving
+        self._changing = any(contact.wall.changes_left for contact in contacts)
         if self.fallback:
             asked = self._started(new, self._fallback_law)
         self._take_laws(asked)
@@ -218,26 +230,38 @@ class ControlTick:
     def step(self, sample: Sample, clock_dt_s: float) -> list[float]:
         """One tick.
 
+        Ramps go by the time that has passed on this computer's clock, since a hand feels for how long a force is held
+        and not in how many ticks; those of a simulated device go by one period a tick, so that a run can be repeated.
+
+        Where the device has nothing new, laws and books wait; what they asked for last is held.
+
         Args:
             sample: the newest state of the device.
-            clock_dt_s: time since the last tick on this computer's clock, for devices without one [s].
+            clock_dt_s: time since the last tick on this computer's clock [s].
 
         Returns:
             The force to write, one element an axis [N]; the same list every time.
         """
         motion = self.motion
         guard = self.guard
-        seen = motion.see(sample, clock_dt_s, self._blind)
-        if guard.mode is Mode.ARMED:
-            limit = guard.max_speed_m_per_s
-            if motion.repeated >= FROZEN_TICKS:
-                self.fail(EventCode.DEVICE_FROZEN, f"the device repeated the same sample {FROZEN_TICKS} times")
-            elif seen and motion.speed_squared > limit * limit:
-                speed = math.sqrt(motion.speed_squared)
-                self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
+        passed_s = self.period_s
+        periods = 1.0
+        if not self._simulated:
+            passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
+            periods = passed_s / self.period_s
+        seen = motion.see(sample, clock_dt_s, passed_s, self._blind)
+        if self._changing:
+            self._change_walls(periods)
+        if guard.mode is not _DISARMED:
+            if not sample.calibrated:
+                seen = False
+            elif motion.repeated:
+                self._check_frozen()
+            elif seen and motion.watches_speed:
+                self._check_speed()
         if not seen or self._blind:
             if not seen or self._blind_gain > 0.0:
-                return self._step_blind(sample.calibrated)
+                return self._step_blind(sample.calibrated, passed_s)
             self._see_again()
         position_m = motion.position_m
         velocity_m_per_s = motion.velocity_m_per_s
@@ -247,23 +271,27 @@ class ControlTick:
         contacts = self._active
         for axis in self._axes:
             requested_n[axis] = force_n[axis] = 0.0
-        for contact in contacts:
-            axis = contact.wall.axis
-            contact.observe(position_m[axis], velocity_m_per_s[axis], dt_s)
-        try:
+        if dt_s > 0.0:
             for contact in contacts:
-                contact.act()
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
-            self._replace_laws(contact, error)
+                axis = contact.wall.axis
+                contact.observe(position_m[axis], velocity_m_per_s[axis], dt_s)
+            try:
+                for contact in contacts:
+                    contact.act(periods)
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
+                self._replace_laws(contact, error, periods)
+        else:
+            for contact in contacts:
+                contact.hold(periods)
         for contact in contacts:
             wall = contact.wall
             axis = wall.axis
             outward = wall.outward
             force_n[axis] += outward * contact.force_n
             requested_n[axis] += outward * contact.requested_n
-        share = guard.reduce(force_n, self.period_s)
+        share = guard.reduce(force_n, passed_s)
         gain = guard.gain
         limit_n = guard.limit_n
         for contact in contacts:
@@ -281,7 +309,33 @@ class ControlTick:
         params = fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m)
         return RunningLaw(fallback, params)
 
-    def _replace_laws(self, contact: Contact, error: BaseException) -> None:
+    def _check_frozen(self) -> None:
+        motion = self.motion
+        if motion.repeated >= LEAST_REPEATS and motion.repeated_s >= self._frozen_s and self.guard.mode is _ARMED:
+            self.fail(EventCode.DEVICE_FROZEN, f"the device had nothing new for {motion.repeated_s * 1e3:.3g} ms")
+
+    def _check_speed(self) -> None:
+        limit = self.guard.max_speed_m_per_s
+        if self.motion.speed_squared > limit * limit and self.guard.mode is _ARMED:
+            speed = math.sqrt(self.motion.speed_squared)
+            self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
+
+    def _watch_speed(self) -> None:
+        if self.guard.max_speed_m_per_s < math.inf:
+            self.motion.watch_speed()
+
+    def _change_walls(self, periods: float) -> None:
+        """Bring changes of walls into force whose time has come: on a real device by a ramp."""
+        self._changing = False
+        for contact in self.contacts:
+            wall = contact.wall
+            if wall.changes_left:
+                if wall.pass_time(periods) and not self._simulated:
+                    self._blend(contact)
+                if wall.changes_left:
+                    self._changing = True
+
+    def _replace_laws(self, contact: Contact, error: BaseException, periods: float) -> None:
         """A law raised or returned nonsense: all are replaced, and asked again."""
         try:
             text = f"{type(error).__name__}: {error}"
@@ -289,25 +343,24 @@ class ControlTick:
             text = type(error).__name__
         self.fail_law(EventCode.LAW_FAILED, f"law {contact.law.module.__name__}: {text}")
         for each in self._active:
-            each.act()
+            each.act(periods)
 
-    def _step_blind(self, calibrated: bool) -> list[float]:
+    def _step_blind(self, calibrated: bool, passed_s: float) -> list[float]:
         """Let the last force out quickly: without a position there is no wall.
 
-        That a device which is not calibrated does not know where it is is no fault: it has no force.
+        That a device which is not calibrated does not know where it is is no fault as long as it has no force.
         """
         force_n = self.force_n
         guard = self.guard
         if guard.mode is Mode.ARMED or (calibrated and (self._excused or not self._blind)):
-            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
+            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE if calibrated else _LOST)
         self._excused = not calibrated
         if not self._blind:
             self._blind = True
             self._blind_gain = 1.0
             self._blind_from_n = list(force_n)
-        self._blind_gain -= self.period_s / BLIND_RAMP_S
-        if self._blind_gain <= 1e-9:
-            self._blind_gain = 0.0
+        self._blind_gain = let_out(self._blind_gain, BLIND_RAMP_S, passed_s)
+        if self._blind_gain == 0.0:
             guard.drop()
         for axis in self._axes:
             force_n[axis] = self._blind_gain * self._blind_from_n[axis]

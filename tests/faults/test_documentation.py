@@ -13,7 +13,7 @@ from hapticd.supervisor.child import STALL_S
 from hapticd.supervisor.events import FLOOD
 from hapticd.supervisor.recovery import FIRST_S, LONGEST_S, STEADY_S
 from hapticd.tick.event import EventCode, LoopEvent
-from hapticd.tick.tick import FROZEN_TICKS
+from hapticd.tick.tick import FROZEN_S, FROZEN_SAMPLES
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "faults.md").read_text()
@@ -51,7 +51,8 @@ def test_the_figures_of_the_page_are_those_of_the_code() -> None:
         wait_s *= 2.0
     assert f"tried after {', '.join(waits)} and then every {LONGEST_S:g} s" in PAGE
     assert (STEADY_S, LATE_S, STALL_S) == (60.0, 0.05, 0.1)
-    assert f"stood still for {FROZEN_TICKS} ticks" in PAGE
+    assert f"stood still for {FROZEN_S * 1e3:g} ms" in PAGE
+    assert f"{FROZEN_SAMPLES} samples of its nominal rate" in PAGE
     assert f"{BURST_TICKS} deadlines and more" in PAGE
     assert f"more than {FLOOD} subscriptions" in PAGE
     assert f"are kept ({FaultsConfig().keep})" in PAGE

@@ -15,6 +15,7 @@ from hapticd.loop.memory import ANSWERED, DISARM, REQUESTS, SUPERVISOR_BEAT, Eve
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
+from tests.loop.clock import Clock
 from tests.tick.rig import device
 
 PRESSED_M = -5e-3
@@ -62,7 +63,12 @@ def shared() -> Iterator[SharedMemory]:
 
 
 @pytest.fixture
-def run(shared: SharedMemory) -> Run:
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    return Clock(monkeypatch)
+
+
+@pytest.fixture
+def run(shared: SharedMemory, clock: Clock) -> Run:
     def run(text: str, each_tick: Callable[[ControlLoop, int], None]) -> Diary:
         """Run armed until somebody stops it; `each_tick` is told the loop and the number of the tick to come."""
         loaded = parse(WALL + text, "x")
@@ -70,9 +76,9 @@ def run(shared: SharedMemory) -> Run:
         driver = Diary()
         ticks = iter(range(10_000))
 
-        def sleep_until(_deadline_ns: int) -> int:
+        def sleep_until(deadline_ns: int) -> int:
             each_tick(loop, next(ticks))
-            return time.monotonic_ns()
+            return clock.sleep_until(deadline_ns)
 
         tick = make_tick(loaded, driver.open())
         loop = ControlLoop(driver, tick, shared, settings.loop, settings.safety, True, sleep_until)
@@ -100,7 +106,7 @@ def test_the_last_force_that_a_device_is_told_is_zero(run: Run, shared: SharedMe
 
 
 def test_the_time_that_a_request_takes_is_not_the_laws(
-    run: Run, shared: SharedMemory, monkeypatch: pytest.MonkeyPatch
+    run: Run, shared: SharedMemory, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each slice computes for twice a period; a law that did so would be replaced after three ticks."""
     slices = iter(range(10))
@@ -110,6 +116,7 @@ def test_the_time_that_a_request_takes_is_not_the_laws(
             end_ns = time.thread_time_ns() + 2_000_000
             while time.thread_time_ns() < end_ns:
                 pass
+            clock.pass_s(2e-3)
             if next(slices) == 9:
                 shared.words[ANSWERED] = shared.words[REQUESTS]
 

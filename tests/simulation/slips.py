@@ -33,7 +33,7 @@ TICK: tuple[tuple[type, str], ...] = (
     (Contact, "act"),
     (Contact, "settle"),
     (Guard, "reduce"),
-    (Wall, "count_tick"),
+    (Wall, "pass_time"),
     (SimulatedDriver, "_read"),
     (SimulatedDriver, "_write"),
     (SimulatedDevice, "advance"),
@@ -42,7 +42,9 @@ PREPARED = (Prepared, "_segments")
 
 APART = {
     "ControlTick.step": {
-        "if guard.mode is Mode.ARMED:": "stops for speed and for a frozen device, which a simulation has not",
+        "if guard.mode is not _DISARMED:": "stops for speed and for a frozen device, which a simulation has not",
+        "if not self._simulated:": "time on a real device; tests/tick/test_tick_time.py",
+        "contact.hold(periods)": "a simulated device does not repeat a sample",
         "self._see_again()": "after a position that was not possible the kernel has ended",
         "if not seen or self._blind_gain > 0.0:": "the same",
         "if self.leaving:": "walls that are gone: the kernel's stays",
@@ -53,6 +55,7 @@ APART = {
         "if repeats:": "a simulated device does not repeat a sample",
         "if LEAST_S <= dt_s < MOST_S:": "its time between samples is the period",
         "if not low_m <= position_m <= high_m:": "the driver ends sooner",
+        "if watches_speed:": "stops for speed; tests/tick/test_tick_time.py",
         "if at_rest:": "after a position that was not possible the kernel has ended",
         "position_m -= origin_m[axis]": "nothing is tared",
     },
@@ -108,6 +111,8 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "time between samples is the period, always": {
         "LongDifference.update: if dt_s > 0.0:": ("Gt 0 is GtE",),
+        "ControlTick.step: if dt_s > 0.0:": ("Gt 0 is GtE",),
+        "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("Gt 0 is GtE",),
         "Contact.observe: def observe(self, position_m, velocity_m_per_s, dt_s):": ("without tick.dt_s = dt_s",),
     },
     "what does not pass the quick look goes to `_number`, which looks at the same": {
@@ -120,12 +125,14 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
         "_number(value)": ("Is 0 is IsNot", "Lt 0 is Gt", "Lt 1 is Gt", "-MOST turned round"),
     },
     "nothing blends": {
-        "Contact.act: self.force_n = blended(self, self.x_m, force_n) if self.blending else force_n": (
-            "self.x_m one later",
+        "Contact.act: self.force_n = blended(self, self.x_m, force_n, periods) if self.blending else force_n": (
+            "self one later", "self.x_m one later", "force_n one later",
         ),
     },
     "it only saves time": {
-        "Wall.count_tick: def count_tick(self):": ("without self.changes_left = bool(self._changes)",),
+        "Contact.settle: touched = in_contact or self.applied_n != 0.0": ("NotEq 0 is Eq", "0.0 is 1.0"),
+        "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("without self._touched = touched",),
+        "Wall.pass_time: def pass_time(self, periods):": ("without self.changes_left = bool(self._changes)",),
         "Prepared._segments: for start, stop in zip(starts, [*starts[1:], self.ticks], strict=True):": (
             "without if start >= self.ticks:", "True is False",
         ),

@@ -27,8 +27,9 @@ def contact(step: Any, fields: dict[str, type] | None = None, **keys: Any) -> Co
 def tick(
     made: Contact, position_m: float, velocity_m_per_s: float = 0.0, share: float = 1.0, gain: float = 1.0
 ) -> float:
+    made.wall.pass_time(1.0)
     made.observe(position_m, velocity_m_per_s, PERIOD_S)
-    made.act()
+    made.act(1.0)
     made.settle(share, gain, 12.0, PERIOD_S)
     return made.applied_n
 
@@ -107,7 +108,7 @@ def test_nonsense_inside_is_an_error(answer: Any, error: type[Exception]) -> Non
     made = contact(lambda _state, _params, _shown: answer)
     made.observe(0.009, 0.0, PERIOD_S)
     with pytest.raises(error):
-        made.act()
+        made.act(1.0)
 
 
 def test_a_law_publishes_damping_and_mass_if_it_has_them() -> None:
@@ -165,7 +166,7 @@ def test_a_limit_that_a_damper_shares_with_the_spring_takes_nothing_from_the_spr
     for _ in range(10):
         position_m -= 1e-3
         made.observe(position_m, -1.0, PERIOD_S)
-        made.act()
+        made.act(1.0)
         made.settle(min(1.0, 12.0 / made.force_n), 1.0, 12.0, PERIOD_S)
     assert made.applied_n == 12.0
     assert made.ledger.generated_j == pytest.approx(10 * 0.5 * 1000.0 * 1e-3**2)

@@ -244,7 +244,7 @@ def test_a_blend_steps_no_further_than_its_bound_and_ends(
     for tick, (x_m, new_n) in enumerate(zip(depths_m, forces_n, strict=True)):
         if not state.blending:
             break
-        force_n = blended(state, x_m, new_n)
+        force_n = blended(state, x_m, new_n, 1.0)
         if tick <= ticks:
             moved_n = abs(cut(new_n) - cut(last_new_n)) + abs(old(x_m) - old(last_x_m))
             assert abs(cut(force_n) - last_n) <= 2.0 * 12.0 / ticks + moved_n + 1e-9
@@ -257,15 +257,15 @@ def test_a_blend_steps_no_further_than_its_bound_and_ends(
 def test_a_blend_starts_at_the_old_force_and_lets_it_out_with_the_depth() -> None:
     state = SimpleNamespace()
     start_blend(state, 6.0, -1e-3, 12.0, 50)
-    assert blended(state, -1e-3, 100.0) == 6.0
+    assert blended(state, -1e-3, 100.0, 1.0) == 6.0
     start_blend(state, 6.0, -1e-3, 12.0, 50)
-    assert blended(state, -5e-4, 100.0) == 3.0
+    assert blended(state, -5e-4, 100.0, 1.0) == 3.0
     start_blend(state, 6.0, -1e-3, 12.0, 50)
-    assert blended(state, -4e-3, 100.0) == 6.0
+    assert blended(state, -4e-3, 100.0, 1.0) == 6.0
 
 
 def test_a_blend_without_a_limit_ends_with_its_ticks() -> None:
     state = SimpleNamespace()
     start_blend(state, 0.0, -1e-3, math.inf, 4)
-    assert [blended(state, -1e-3, 1e6) for _ in range(5)] == [0.0, 2.5e5, 5e5, 7.5e5, 1e6]
+    assert [blended(state, -1e-3, 1e6, 1.0) for _ in range(5)] == [0.0, 2.5e5, 5e5, 7.5e5, 1e6]
     assert not state.blending

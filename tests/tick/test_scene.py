@@ -63,7 +63,7 @@ def test_a_wall_without_stiffness_stores_nothing() -> None:
 def test_a_change_comes_at_the_first_tick_at_or_after_its_time(at_s: float) -> None:
     changing = wall(1000.0, changes=[{"at_s": at_s, "stiffness_n_per_m": 2000.0}])
     for count in range(6):
-        changing.count_tick()
+        changing.pass_time(1.0)
         assert changing.stiffness_n_per_m == (2000.0 if count * 1e-3 >= at_s - 1e-12 else 1000.0)
     assert not changing.changes_left
 
@@ -74,10 +74,10 @@ def test_a_change_on_a_tick_is_not_put_off_by_rounding(rate_hz: float) -> None:
     period_s = round(1e9 / rate_hz) * 1e-9
     for at_tick in (1, 7, 700, 4_001, 5_600, 1_000_003):
         changing = wall(1000.0, period_s, changes=[{"at_s": at_tick / rate_hz, "stiffness_n_per_m": 5.0}])
-        changing._ticks = at_tick - 1
-        changing.count_tick()
+        changing._periods = at_tick - 2
+        changing.pass_time(1.0)
         assert changing.changes_left
-        changing.count_tick()
+        changing.pass_time(1.0)
         assert not changing.changes_left
 
 
@@ -89,7 +89,7 @@ def test_changes_name_what_they_change_and_leave_the_rest() -> None:
     )
     seen = []
     for _ in range(4):
-        changing.count_tick()
+        changing.pass_time(1.0)
         seen.append((changing.stiffness_n_per_m, changing.damping_n_s_per_m))
     assert seen == [(1000.0, 2.0), (1000.0, -1.0), (0.0, -1.0), (0.0, -1.0)]
 

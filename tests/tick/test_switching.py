@@ -131,7 +131,7 @@ def test_whatever_is_switched_to_whatever_the_force_is_bounded_and_goes_by_ramps
             for contact, was in before.items():
                 if not contact.in_contact or not contact.blending:
                     continue
-                if number == 0 and contact.blend_tick == 1.0:  # switched: what was applied, let out with the depth
+                if number == 0 and contact.blend_tick == 0.0:  # switched: what was applied, let out with the depth
                     held_n = was[0] * min(1.0, contact.x_m / was[2])
                     assert contact.force_n == pytest.approx(held_n, abs=1e-12)
                 elif number > 0 and contact.blend_tick <= contact.blend_ticks:  # w < 1

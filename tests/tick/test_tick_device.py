@@ -81,7 +81,9 @@ def test_whatever_the_device_says_the_written_force_is_finite_and_bounded(
         sample.velocity_m_per_s[:] = velocity_m_per_s
         force_n = tick.step(sample, clock_dt_s)
         assert math.hypot(*force_n) <= LIMIT_N * (1.0 + 1e-9)
-        assert 0.0 < tick.motion.dt_s < 1.0
+        assert 0.0 <= tick.motion.dt_s < 1.0
+        assert tick.motion.dt_s > 0.0 or tick.motion.repeated > 0
+        assert all(contact.tick.dt_s > 0.0 for contact in tick.contacts), "a law is told that time has passed"
         numbers = [*tick.motion.position_m, *tick.motion.velocity_m_per_s, *tick.requested_n, *rig.books_j]
         assert all(map(math.isfinite, numbers))
         for contact in tick.contacts:

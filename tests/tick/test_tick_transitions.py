@@ -200,7 +200,7 @@ def test_whatever_is_asked_in_whatever_order_the_force_goes_by_ramps(path: list[
 
 def test_an_unchanged_wall_keeps_its_clock_its_law_and_its_books_wherever_it_stands_in_the_list() -> None:
     changing = wall(2000.0, changes=[{"at_s": 0.03, "stiffness_n_per_m": 4000.0}])
-    rig = pressed(wall(100.0, position_m=-1.0), changing, depth_m=1e-3)
+    rig = pressed(wall(100.0, position_m=-1.0), changing, depth_m=1e-3, simulated=True)
     kept = rig.tick.contacts[1]
     rig.force(-1e-3, ticks=10)
     rig.tick.switch(scene(changing, wall(300.0, position_m=-2.0)))

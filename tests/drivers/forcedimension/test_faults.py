@@ -15,7 +15,7 @@ from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DriverErro
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
-from hapticd.tick.tick import FROZEN_TICKS, ControlTick
+from hapticd.tick.tick import FROZEN_S, ControlTick
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, Bench
 
@@ -170,7 +170,7 @@ def until_disarmed(driver: ForceDimension, tick: ControlTick) -> int:
 def test_data_that_is_never_new_is_a_frozen_device(bench: Bench) -> None:
     driver, tick = armed(bench)
     bench.set(stale=1)
-    assert ticks_until_code(driver, tick, EventCode.DEVICE_FROZEN) == FROZEN_TICKS
+    assert ticks_until_code(driver, tick, EventCode.DEVICE_FROZEN) == round(FROZEN_S / 1e-3)
     assert until_disarmed(driver, tick) <= 51
     assert bench.vector("force_n") == [0.0, 0.0, 0.0]
     driver.close()
@@ -201,7 +201,7 @@ def test_a_device_that_repeats_one_position_as_new_cannot_be_told_from_one_that_
     """The SDK has no count and no clock of the device: docs/omega7.md says so."""
     driver, tick = armed(bench)
     bench.set(frozen=1)
-    for _ in range(2 * FROZEN_TICKS):
+    for _ in range(round(2.0 * FROZEN_S / 1e-3)):
         driver.write(tick.step(driver.read(), 1e-3))
     assert tick.fault == 0
     driver.close()
