@@ -14,6 +14,9 @@ compiled code knows no strings.
 
 A state that has the fields `damping_n_s_per_m` or `felt_mass_kg` has them published.
 
+A law that learns names what it has learnt, and the next law on that wall, itself when the device is armed again, finds
+it in its snapshot: `LEARNED = ("damping_n_s_per_m",)`. What a law does not name is gone with it.
+
 Signs: x < 0 is inside the wall; a positive force pushes the device out.
 """
 
@@ -37,6 +40,7 @@ __all__ = [
     "Scalar",
     "check_law",
     "fresh_state",
+    "learned_fields",
     "plain_object",
     "scalar_params",
     "state_fields",
@@ -126,7 +130,8 @@ class LawSnapshot:
         velocity_m_per_s: estimated velocity along the wall's normal [m/s].
         applied_n: force applied by this contact in the last tick [N].
         debt_j: energy that this contact has generated and not yet dissipated [J], >= 0; a credit is not carried.
-        damping_n_s_per_m: damping that the law before had reached [N s/m]; 0 when unknown.
+        damping_n_s_per_m: damping that the law before has learnt [N s/m]; 0 when it has none, or none that it names
+            in `LEARNED`.
     """
 
     __slots__ = ("applied_n", "damping_n_s_per_m", "debt_j", "velocity_m_per_s", "x_m")
@@ -148,6 +153,9 @@ class LawSnapshot:
     __repr__ = _shown
 
 
+_HANDED_ON = ("damping_n_s_per_m",)
+
+
 @functools.cache
 def state_fields(law: ModuleType) -> dict[str, type[Scalar]]:
     """Names and types of the scalar fields of a law's state, in declaration order.
@@ -167,8 +175,25 @@ def state_fields(law: ModuleType) -> dict[str, type[Scalar]]:
     return fields
 
 
+def learned_fields(law: ModuleType) -> tuple[str, ...]:
+    """What a law has learnt and hands on: names of fields of its state that a snapshot has as well.
+
+    Raises:
+        PluginError: `LEARNED` names another field, or is no tuple of names.
+    """
+    learned = getattr(law, "LEARNED", ())
+    if not isinstance(learned, tuple):
+        raise PluginError(f"law {law.__name__}: LEARNED must be a tuple of names, not {learned!r}")
+    for name in learned:
+        if name not in _HANDED_ON:
+            raise PluginError(f"law {law.__name__}: LEARNED has {name!r}; handed on is {', '.join(_HANDED_ON)}")
+        if name not in state_fields(law):
+            raise PluginError(f"law {law.__name__}: LEARNED has {name!r}, which State has not")
+    return learned
+
+
 def scalar_params(params: LawParams) -> dict[str, Scalar]:
-    """A law's parameters as plain scalars: a `Literal` value becomes its index, None becomes -1.
+    """A law's parameters as plain scalars: a `Literal` value becomes its index.
 
     Raises:
         PluginError: a parameter is neither a number, a bool nor a choice of literals.
@@ -216,3 +241,4 @@ def check_law(law: ModuleType) -> None:
     if not (isinstance(law.Params, type) and issubclass(law.Params, LawParams)):
         raise PluginError(f"law {law.__name__}: Params must derive from hapticd.law.LawParams")
     state_fields(law)
+    learned_fields(law)

@@ -14,6 +14,8 @@ from pydantic import Field
 from hapticd.law import LawParams
 from hapticd.tick.energy import CycleFields, cycle_ended
 
+LEARNED = ("damping_n_s_per_m",)
+
 WORK_SPRING, WORK_TOTAL = range(2)
 PAIRING_EXACT, PAIRING_NEW_FORCE, PAIRING_POWER, PAIRING_HELD_POWER = range(4)
 FORCE_DELAY_IDENTIFIED, FORCE_DELAY_NONE, FORCE_DELAY_ONE_SAMPLE = range(3)

@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from hapticd.errors import PluginError
-from hapticd.law import LawParams, LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
+from hapticd.law import LawParams, LawSnapshot, LawTick, fresh_state, learned_fields, plain_object, scalar_params
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.guard import blended, start_blend
 from hapticd.tick.scene import Wall
@@ -25,7 +25,16 @@ class RunningLaw:
         params: its validated parameters.
     """
 
-    __slots__ = ("module", "params", "publishes", "publishes_damping", "publishes_mass", "state", "step")
+    __slots__ = (
+        "learns_damping",
+        "module",
+        "params",
+        "publishes",
+        "publishes_damping",
+        "publishes_mass",
+        "state",
+        "step",
+    )
 
     def __init__(self, module: ModuleType, params: LawParams) -> None:
         self.module = module
@@ -34,6 +43,7 @@ class RunningLaw:
         self.step = module.step
         self.publishes_damping = hasattr(self.state, "damping_n_s_per_m")
         self.publishes_mass = hasattr(self.state, "felt_mass_kg")
+        self.learns_damping = "damping_n_s_per_m" in learned_fields(module)
         self.publishes = self.publishes_damping or self.publishes_mass
 
     def another(self) -> RunningLaw:
@@ -139,7 +149,8 @@ class Contact:
             velocity_m_per_s: velocity of the wall's axis [m/s].
         """
         velocity_m_per_s = self.wall.outward * velocity_m_per_s
-        return LawSnapshot(self.x_m, velocity_m_per_s, self.applied_n, self.ledger.debt_j, self.damping_n_s_per_m)
+        learned_n_s_per_m = self.damping_n_s_per_m if self.law.learns_damping else 0.0
+        return LawSnapshot(self.x_m, velocity_m_per_s, self.applied_n, self.ledger.debt_j, learned_n_s_per_m)
 
     def take_law(self, law: RunningLaw, velocity_m_per_s: float, dt_s: float) -> None:
         """Go on with another law, already started; the caller blends.

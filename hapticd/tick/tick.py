@@ -283,8 +283,8 @@ class ControlTick:
             except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
                 self._replace_laws(contact, error, periods)
         else:
-            for contact in contacts:
-                contact.hold(periods)
+            for waiting in contacts:
+                waiting.hold(periods)
         for contact in contacts:
             wall = contact.wall
             axis = wall.axis

@@ -44,7 +44,7 @@ APART = {
     "ControlTick.step": {
         "if guard.mode is not _DISARMED:": "stops for speed and for a frozen device, which a simulation has not",
         "if not self._simulated:": "time on a real device; tests/tick/test_tick_time.py",
-        "contact.hold(periods)": "a simulated device does not repeat a sample",
+        "waiting.hold(periods)": "a simulated device does not repeat a sample",
         "self._see_again()": "after a position that was not possible the kernel has ended",
         "if not seen or self._blind_gain > 0.0:": "the same",
         "if self.leaving:": "walls that are gone: the kernel's stays",
@@ -55,9 +55,16 @@ APART = {
         "if repeats:": "a simulated device does not repeat a sample",
         "if LEAST_S <= dt_s < MOST_S:": "its time between samples is the period",
         "if not low_m <= position_m <= high_m:": "the driver ends sooner",
-        "if watches_speed:": "stops for speed; tests/tick/test_tick_time.py",
+        "speed_squared = 0.0": "stops for speed; tests/tick/test_tick_time.py",
+        "if watches_speed:": "the same",
+        "self.speed_squared = speed_squared": "the same",
         "if at_rest:": "after a position that was not possible the kernel has ended",
         "position_m -= origin_m[axis]": "nothing is tared",
+    },
+    "Wall.pass_time": {
+        "changed = False": "changes come by a ramp on a real device; tests/tick/test_tick_time.py",
+        "changed = True": "the same",
+        "return changed": "the same",
     },
     "Contact.act": {"self.blending = False": "blends are at transitions, which the kernel has not"},
     "Contact.settle": {"if self.blending:": "the same"},
@@ -111,7 +118,8 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "time between samples is the period, always": {
         "LongDifference.update: if dt_s > 0.0:": ("Gt 0 is GtE",),
-        "ControlTick.step: if dt_s > 0.0:": ("Gt 0 is GtE",),
+        "ControlTick.step: if dt_s > 0.0:": ("Gt 0 is GtE", "without for waiting in contacts:"),
+        "ControlTick.step: seen = motion.see(sample, clock_dt_s, passed_s, self._blind)": ("clock_dt_s one later",),
         "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("Gt 0 is GtE",),
         "Contact.observe: def observe(self, position_m, velocity_m_per_s, dt_s):": ("without tick.dt_s = dt_s",),
     },
@@ -126,12 +134,15 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "nothing blends": {
         "Contact.act: self.force_n = blended(self, self.x_m, force_n, periods) if self.blending else force_n": (
-            "self one later", "self.x_m one later", "force_n one later",
+            "self.x_m one later", "force_n one later",
         ),
     },
     "it only saves time": {
         "Contact.settle: touched = in_contact or self.applied_n != 0.0": ("NotEq 0 is Eq", "0.0 is 1.0"),
         "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("without self._touched = touched",),
+    },
+    "a debt that is left where contact ends is for the next law; tests/tick/test_tick_books.py": {
+        "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("and is or, or is and",),
         "Wall.pass_time: def pass_time(self, periods):": ("without self.changes_left = bool(self._changes)",),
         "Prepared._segments: for start, stop in zip(starts, [*starts[1:], self.ticks], strict=True):": (
             "without if start >= self.ticks:", "True is False",

@@ -94,7 +94,9 @@ def test_the_damping_that_was_reached_is_told_to_the_next_law() -> None:
         return force_n
 
     told: list[Any] = []
-    rig = pressed(module=law(step, fields={"damping_n_s_per_m": float}))
+    module = law(step, fields={"damping_n_s_per_m": float})
+    module.__dict__["LEARNED"] = ("damping_n_s_per_m",)
+    rig = pressed(module=module)
     rig.tick.switch(make_law=running(law(returns(0.0), lambda _state, _params, snapshot: told.append(snapshot))))
     assert told[-1].damping_n_s_per_m == 31.0
 
@@ -104,3 +106,17 @@ def test_the_simulation_profile_lifts_the_limits_of_a_simulated_device() -> None
     assert rig.force(-0.05) == pytest.approx(600.0)
     with pytest.raises(ConfigError):
         Guard(SafetyConfig(profile="simulation"), device())
+
+
+def test_a_debt_ends_with_the_contact_one_sample_after_the_last_force() -> None:
+    rig = pressed(wall(2000.0))
+    contact = rig.tick.contacts[0]
+    while contact.ledger.debt_j == 0.0:  # a wall that is left sample by sample gives more than it took
+        rig.force(-3e-3 if contact.x_m == -2e-3 else -2e-3)
+    rig.force(0.01)
+    assert contact.ledger.debt_j > 0.0
+    rig.force(0.01)
+    assert contact.ledger.debt_j == 0.0
+    before = rig.books_j
+    rig.force(0.05, ticks=20)
+    assert rig.books_j == before
