@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import gc
 import os
 import signal
 import socket
@@ -24,18 +23,16 @@ import msgpack
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import MAX_WALLS
-from hapticd.device import DeviceInfo, Sample
+from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
 from hapticd.loop.resume import ResumeState, identity
+from hapticd.loop.warm_up import warm_up
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.record import RecordLayout
-from hapticd.tick.tick import ControlTick
 from hapticd.version import __version__
-
-WARM_UP_TICKS = 200
 
 DEVICE_LOST = 3
 """Exit code: the device is gone, and may come back."""
@@ -105,7 +102,7 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
         for name, law in _installed_laws().items():
             control.requests.know(name, law)
         control.requests.know(settings.controller.law, config.law)
-        _warm_up(make_tick(config, info))
+        warm_up(make_tick(config, info))
 
         def stop(_signal: int, _frame: object) -> None:
             control.session.stop_requested = True
@@ -152,23 +149,6 @@ def _installed_laws() -> dict[str, ModuleType]:
         except PluginError:
             continue  # it is refused by name when somebody asks for it
     return laws
-
-
-def _warm_up(tick: ControlTick) -> None:
-    """Run a copy of the tick on presses and releases of its walls, so that first calls are behind us."""
-    sample = Sample(len(tick.info.axes))
-    surface_m = [0.5 * (low + high) for low, high in tick.info.workspace_m]
-    for contact in tick.contacts:
-        surface_m[contact.wall.axis] = contact.wall.position_m
-    sample.position_m[:] = surface_m
-    tick.start(sample)
-    tick.arm()
-    for count in range(WARM_UP_TICKS):
-        depth_m = 1e-4 * (count % 20 - 10)
-        sample.time_ns = sample.sequence = count + 1
-        sample.position_m[:] = [at + depth_m for at in surface_m]
-        tick.step(sample, tick.period_s)
-    gc.collect()
 
 
 if __name__ == "__main__":

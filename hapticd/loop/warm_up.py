@@ -1,0 +1,49 @@
+"""The first calls of a tick, made before the first deadline."""
+
+from __future__ import annotations
+
+import gc
+import math
+
+from hapticd.device import Sample
+from hapticd.tick.tick import ControlTick
+
+TICKS = 200
+
+_STEPS = 10
+"""Samples from a wall's surface to the deepest point of a press."""
+
+_STEP_M = 1e-4
+_SHARE_OF_LIMIT = 0.1
+"""Speed of the hand, as a share of what the guard lets pass along one axis."""
+
+
+def warm_up(tick: ControlTick) -> None:
+    """Press and release the walls of a tick that is made for this, as a hand would, a period a tick.
+
+    Args:
+        tick: fresh; it is of no other use afterwards.
+    """
+    sample = Sample(len(tick.info.axes))
+    step_m = min(_STEP_M, _SHARE_OF_LIMIT * tick.guard.max_speed_m_per_s * tick.period_s)
+    surface_m = [_middle(low_m, high_m) for low_m, high_m in tick.info.workspace_m]
+    for contact in tick.contacts:
+        low_m, high_m = tick.info.workspace_m[contact.wall.axis]
+        surface_m[contact.wall.axis] = min(max(contact.wall.position_m, low_m), high_m)
+    period_ns = round(tick.period_s * 1e9)
+    for count in range(TICKS + 1):
+        depth_m = step_m * (abs(count % (4 * _STEPS) - 2 * _STEPS) - _STEPS)
+        sample.time_ns = count * period_ns
+        sample.sequence = count
+        sample.position_m[:] = [at_m + depth_m for at_m in surface_m]
+        if count == 0:
+            tick.start(sample)
+            tick.arm()
+        else:
+            tick.step(sample, tick.period_s)
+    gc.collect()
+
+
+def _middle(low_m: float, high_m: float) -> float:
+    middle_m = 0.5 * (low_m + high_m)
+    return middle_m if math.isfinite(middle_m) else 0.0
