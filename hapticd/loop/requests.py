@@ -144,7 +144,7 @@ class RequestHandler:
             yield
         new_scene = SceneConfig.model_validate({**scene, "walls": walls})
         yield
-        tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
+        yield from tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
         session.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
         if not keep_law:
             session.law_count += 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from copy import copy
 from types import ModuleType
 from typing import Any
@@ -285,19 +284,6 @@ class Contact:
         tick.applied_contact_n = self._applied_contact_n = share * contact_n
         spring_n = wall.spring_n
         self._applied_spring_n = gain * (spring_n if spring_n <= limit_n else limit_n)
-
-
-def heirs(walls: Sequence[Wall], contacts: Iterable[Contact]) -> list[Contact | None]:
-    """For each wall the contact that goes on with it, if any: the very same wall's, else one in the same place."""
-    free = list(contacts)
-    found: list[Contact | None] = [None] * len(walls)
-    for same in (lambda old, new: old.config == new.config, Wall.same_place):
-        for index, wall in enumerate(walls):
-            contact = next((each for each in free if found[index] is None and same(each.wall, wall)), None)
-            if contact is not None:
-                free.remove(contact)
-                found[index] = contact
-    return found
 
 
 def _number(value: Any) -> float:

@@ -21,6 +21,13 @@ MARGIN = 0.5
 """How far outside its declared workspace, as a share of its size, a device may claim to be."""
 
 
+FROZEN_S = 0.02
+FROZEN_SAMPLES = 20
+LEAST_REPEATS = 3
+"""A device is frozen that has had nothing new for this time [s], and for this many samples of its nominal rate, and at
+this many reads in a row: whether loop or device is the slower one."""
+
+
 class Motion:
     """Positions, velocities and time, from one sample to the next.
 
@@ -49,6 +56,7 @@ class Motion:
         "_differences",
         "_estimators",
         "_filtered",
+        "_frozen_s",
         "_has_clock",
         "_has_sequence",
         "_period_s",
@@ -80,6 +88,8 @@ class Motion:
         self._period_s = period_s
         self._estimators: list[Estimator] = [make_estimator(velocity, info.resolution_m) for _ in range(axes)]
         self.watches_speed = False
+        # Less half a sample, so that no clock's rounding decides.
+        self._frozen_s = max(FROZEN_S, FROZEN_SAMPLES / info.nominal_rate_hz) * (1.0 - 0.5 / FROZEN_SAMPLES)
         self._filtered = not isinstance(self._estimators[0], Difference)
         self._differences = [Difference() for _ in range(axes)]
         self._bounds_m = [
@@ -163,12 +173,17 @@ class Motion:
         self.speed_squared = speed_squared
         return True
 
-    def watch_speed(self) -> None:
-        """Keep `speed_squared` from the next sample on."""
-        if not self.watches_speed:
-            self.watches_speed = True
+    @property
+    def frozen(self) -> bool:
+        """Whether the device has had nothing new for so long that it is not to be relied on."""
+        return self.repeated >= LEAST_REPEATS and self.repeated_s >= self._frozen_s
+
+    def watch_speed(self, watch: bool) -> None:
+        """Keep `speed_squared` from the next sample on, or not."""
+        if watch and not self.watches_speed:
             for axis in self._axes:
                 self._differences[axis].start(self.position_m[axis])
+        self.watches_speed = watch
 
     def move_origin(self, origin_m: list[float]) -> None:
         """Count positions from another point, and stand there at rest [m]."""

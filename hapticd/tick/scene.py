@@ -25,6 +25,7 @@ class Wall:
         period_s: time between ticks, to count `at_s` in ticks [s].
 
     Attributes:
+        keys: what the table says, quick to compare.
         axis: index of the axis.
         outward: +1.0 when the free side is the positive one, else -1.0.
         position_m: the plane on the axis [m].
@@ -40,6 +41,7 @@ class Wall:
         "changes_left",
         "config",
         "damping_n_s_per_m",
+        "keys",
         "outward",
         "position_m",
         "spring_n",
@@ -48,6 +50,7 @@ class Wall:
 
     def __init__(self, config: WallConfig, axis: int, period_s: float) -> None:
         self.config = config
+        self.keys = tuple(config.__dict__.values())
         self.axis = axis
         self.outward = 1.0 if config.free_side == "positive" else -1.0
         self.position_m = config.position_m
@@ -102,9 +105,19 @@ class Wall:
             return -0.5 * spring_n * x_m
         return limit_n * (-x_m - 0.5 * limit_n / self.stiffness_n_per_m)
 
+    def let_go(self) -> None:
+        """Be gone: without force from now on."""
+        self.stiffness_n_per_m = self.damping_n_s_per_m = 0.0
+        self._changes.clear()
+        self.changes_left = False
+
+    def same_wall(self, other: Wall) -> bool:
+        """Whether the tables of the two say the same."""
+        return self.keys == other.keys
+
     def same_place(self, other: Wall) -> bool:
         """Whether the two planes coincide, so that one may turn into the other under a hand."""
-        return (self.axis, self.outward, self.position_m) == (other.axis, other.outward, other.position_m)
+        return self.position_m == other.position_m and self.axis == other.axis and self.outward == other.outward
 
 
 def compile_walls(walls: Iterable[WallConfig], info: DeviceInfo, period_s: float) -> list[Wall]:

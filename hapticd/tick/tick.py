@@ -6,24 +6,19 @@ positions -> velocities -> contacts -> laws -> guard -> force; then the books
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator
 
 from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
 from hapticd.device import DeviceInfo, Sample
 from hapticd.tick import fallback
-from hapticd.tick.contact import Contact, RunningLaw, heirs
+from hapticd.tick.arrangement import Arrangement, arrange
+from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
 from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, let_out, limits
 from hapticd.tick.motion import Motion
-from hapticd.tick.scene import Wall, compile_walls
-
-FROZEN_S = 0.02
-FROZEN_SAMPLES = 20
-LEAST_REPEATS = 3
-"""A device is frozen that has had nothing new for this time [s], and for this many samples of its nominal rate, and at
-this many reads in a row: whether loop or device is the slower one."""
+from hapticd.tick.scene import compile_walls
 
 _IMPOSSIBLE = "the device reported a position that is not possible"
 _LOST = "the device does not know any more where it is"
@@ -90,15 +85,13 @@ class ControlTick:
         self._last_fault = 0
         self._axes = range(axes)
         self._simulated = info.simulated
-        # Less half a sample, so that no clock's rounding decides.
-        self._frozen_s = max(FROZEN_S, FROZEN_SAMPLES / info.nominal_rate_hz) * (1.0 - 0.5 / FROZEN_SAMPLES)
         self._active = self.contacts  # and those that leave
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         self._blind = True
         self._excused = False
         self._blind_gain = 0.0
         self._blind_from_n = [0.0] * axes
-        self._watch_speed()
+        self.motion.watch_speed(guard.max_speed_m_per_s < math.inf)
 
     @property
     def ramp_ticks(self) -> int:
@@ -142,11 +135,12 @@ class ControlTick:
             return True
         if self.guard.latched:
             return False
-        laws = self._started(self.contacts, self.make_law)
+        laws = self._start_laws([(contact, self.make_law()) for contact in self.contacts])
         self.guard.arm()
         self.fallback = False
-        self._take_laws(laws)
-        for contact in self._active:
+        for contact, law in laws:
+            self._take_law(contact, law)
+        for contact in self.leaving:
             self._blend(contact)
         return True
 
@@ -167,8 +161,10 @@ class ControlTick:
         scene: SceneConfig | None = None,
         safety: SafetyConfig | None = None,
         make_law: Callable[[], RunningLaw] | None = None,
-    ) -> None:
+    ) -> Generator[None, None, None]:
         """Take another scene, other limits, another law: all or nothing, and without a step in force.
+
+        It is made ready a slice at a time, and ticks may go on in between; what comes after the last takes it.
 
         A wall that did not change keeps its clock, law and books; one that changed in place keeps law and books; one
         that is gone fades out. Another law is put on every wall, but not in the place of the fallback.
@@ -179,33 +175,45 @@ class ControlTick:
         """
         if safety is not None:
             limits(safety, self.info)
-        contacts = self.contacts
-        changed: list[tuple[Contact, Wall]] = []
-        if scene is not None:
-            contacts, changed = self._arrange(compile_walls(scene.walls, self.info, self.period_s))
-        new = [contact for contact in contacts if contact not in self.contacts]
         make = self.make_law if make_law is None else make_law
-        asked = self._started(new if make_law is None else contacts, make)
+        there = Arrangement(self.contacts)
+        if scene is not None:
+            walls = compile_walls(scene.walls, self.info, self.period_s)
+            yield
+            there = yield from arrange(walls, self.contacts, self.info, make)
+        laws = [(contact, contact.law) for contact in there.new]
+        if make_law is not None:
+            for contact in there.contacts:
+                if contact not in there.new:
+                    laws.append((contact, make()))
+                    yield
+        gone = []
+        for contact in [each for each in self.contacts if each not in there.contacts]:  # a blend takes their force
+            gone.append((contact, RunningLaw(fallback, fallback.Params(damping_n_s_per_m=0.0))))
+            yield
+        for contact in there.new:
+            contact.start(self.motion.position_m[contact.wall.axis])
+        self._start_laws(laws)
         # From here on nothing can fail.
         self.make_law = make
         if safety is not None:
             self.guard.configure(safety, self.info, self.force_n)
-            self._watch_speed()
+            self.motion.watch_speed(self.guard.max_speed_m_per_s < math.inf)
             self.ramp_s = safety.ramp_s
-        for contact in self.contacts:
-            if contact not in contacts:
-                self._let_go(contact)
-        for contact, wall in changed:
+        for contact, law in gone:
+            contact.wall.let_go()
+            self.leaving.append(contact)
+            self._take_law(contact, law)
+        for contact, wall in there.changed:
             contact.wall = wall
             self._blend(contact)
-        self.contacts = contacts
-        self._active = contacts + self.leaving
-        self._changing = any(contact.wall.changes_left for contact in contacts)
+        self.contacts = there.contacts
+        self._active = self.contacts + self.leaving
+        self._changing = any(contact.wall.changes_left for contact in self.contacts)
         if self.fallback:
-            asked = self._started(new, self._fallback_law)
-        self._take_laws(asked)
-        for contact, _ in asked:
-            self._blend(contact)
+            laws = self._start_laws([(contact, self._fallback_law()) for contact in there.new])
+        for contact, law in laws:
+            self._take_law(contact, law)
 
     def release(self, ramp_s: float | None = None) -> None:
         """Ramp the force to zero and stay disarmed."""
@@ -222,9 +230,8 @@ class ControlTick:
         """Put the damping fallback in the place of every law, and stop."""
         if not self.fallback:
             self.fallback = True
-            self._take_laws(self._started(self.contacts, self._fallback_law))
-            for contact in self.contacts:
-                self._blend(contact)
+            for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in self.contacts]):
+                self._take_law(contact, law)
         self.fail(code, text)
 
     def step(self, sample: Sample, clock_dt_s: float) -> list[float]:
@@ -256,7 +263,9 @@ class ControlTick:
             if not sample.calibrated:
                 seen = False
             elif motion.repeated:
-                self._check_frozen()
+                if motion.frozen and guard.mode is _ARMED:
+                    silent_ms = motion.repeated_s * 1e3
+                    self.fail(EventCode.DEVICE_FROZEN, f"the device had nothing new for {silent_ms:.3g} ms")
             elif seen and motion.watches_speed:
                 self._check_speed()
         if not seen or self._blind:
@@ -309,20 +318,11 @@ class ControlTick:
         params = fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m)
         return RunningLaw(fallback, params)
 
-    def _check_frozen(self) -> None:
-        motion = self.motion
-        if motion.repeated >= LEAST_REPEATS and motion.repeated_s >= self._frozen_s and self.guard.mode is _ARMED:
-            self.fail(EventCode.DEVICE_FROZEN, f"the device had nothing new for {motion.repeated_s * 1e3:.3g} ms")
-
     def _check_speed(self) -> None:
         limit = self.guard.max_speed_m_per_s
         if self.motion.speed_squared > limit * limit and self.guard.mode is _ARMED:
             speed = math.sqrt(self.motion.speed_squared)
             self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
-
-    def _watch_speed(self) -> None:
-        if self.guard.max_speed_m_per_s < math.inf:
-            self.motion.watch_speed()
 
     def _change_walls(self, periods: float) -> None:
         """Bring changes of walls into force whose time has come: on a real device by a ramp."""
@@ -374,47 +374,21 @@ class ControlTick:
             contact.start(self.motion.position_m[contact.wall.axis])
             self._blend(contact)
 
-    def _started(
-        self, contacts: Iterable[Contact], make_law: Callable[[], RunningLaw]
-    ) -> list[tuple[Contact, RunningLaw]]:
-        """A law for each contact, started where the contact is now; nothing has changed yet."""
+    def _start_laws(self, laws: list[tuple[Contact, RunningLaw]]) -> list[tuple[Contact, RunningLaw]]:
+        """Start each law where its contact is now, and hand them back; nothing else has changed yet."""
         velocity_m_per_s = self.motion.velocity_m_per_s
-        laws = []
-        for contact in contacts:
-            law = make_law()
+        for contact, law in laws:
             law.start(contact.snapshot(velocity_m_per_s[contact.wall.axis]))
-            laws.append((contact, law))
         return laws
 
-    def _take_laws(self, laws: Iterable[tuple[Contact, RunningLaw]]) -> None:
+    def _take_law(self, contact: Contact, law: RunningLaw) -> None:
+        """Put a law that has been started on a contact: by a ramp."""
         motion = self.motion
-        for contact, law in laws:
-            contact.take_law(law, motion.velocity_m_per_s[contact.wall.axis], motion.dt_s)
+        contact.take_law(law, motion.velocity_m_per_s[contact.wall.axis], motion.dt_s)
+        self._blend(contact)
 
     def _blend(self, contact: Contact) -> None:
         contact.blend(self.ramp_ticks, self.guard.gain, self.guard.limit_n)
-
-    def _arrange(self, walls: list[Wall]) -> tuple[list[Contact], list[tuple[Contact, Wall]]]:
-        """Contacts for these walls, old ones where they fit, and which of those have to take their new wall."""
-        contacts = []
-        changed = []
-        for wall, heir in zip(walls, heirs(walls, self.contacts), strict=True):
-            contact = heir or Contact(wall, self._fallback_law(), self.info.resolution_m)
-            if heir is None:
-                contact.start(self.motion.position_m[wall.axis])
-            elif heir.wall.config != wall.config:
-                changed.append((heir, wall))
-            contacts.append(contact)
-        return contacts, changed
-
-    def _let_go(self, contact: Contact) -> None:
-        """A wall that is gone: from now on it asks for nothing, and a blend takes its force there."""
-        nothing = {"stiffness_n_per_m": 0.0, "damping_n_s_per_m": 0.0, "changes": ()}
-        contact.wall = Wall(contact.wall.config.model_copy(update=nothing), contact.wall.axis, self.period_s)
-        law = RunningLaw(fallback, fallback.Params(damping_n_s_per_m=0.0))
-        self._take_laws([(contact, law)])
-        self._blend(contact)
-        self.leaving.append(contact)
 
     def _drop_gone(self) -> None:
         """Close the books of walls whose force has faded out."""

@@ -13,7 +13,7 @@ from hapticd.supervisor.child import STALL_S
 from hapticd.supervisor.events import FLOOD
 from hapticd.supervisor.recovery import FIRST_S, LONGEST_S, STEADY_S
 from hapticd.tick.event import EventCode, LoopEvent
-from hapticd.tick.tick import FROZEN_S, FROZEN_SAMPLES
+from hapticd.tick.motion import FROZEN_S, FROZEN_SAMPLES
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "faults.md").read_text()

@@ -210,7 +210,7 @@ def test_another_law_is_in_force_once_its_ramp_is_over(
     """With the first news of the device and the write after the ramp's time, to the last bit."""
     bed = Bed(monkeypatch, reads_s, news_s)
     bed.forgives(True)
-    done_s = bed.run(lambda: bed.tick.switch(make_law=running(pushes(11.0))))
+    done_s = bed.run(lambda: list(bed.tick.switch(make_law=running(pushes(11.0)))))
     forces_n = [(at_s - done_s, force_n) for at_s, force_n in bed.driver.written]
     settled_s = RAMP_S + PERIOD_S + max(news_s, 0.0)
     after_n = [force_n for at_s, force_n in forces_n if settled_s + 1e-9 <= at_s <= 0.5]

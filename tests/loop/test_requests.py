@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
+from types import FrameType
 from typing import Any
 
 import pytest
@@ -152,3 +154,50 @@ def test_nothing_that_is_asked_leaves_a_cycle_for_the_collector_which_is_off_in_
     finally:
         gc.enable()
     assert min(found) == 0
+
+
+EIGHT = "".join(f"[[scene.walls]]\nstiffness_n_per_m = 100.0\nposition_m = {-0.001 * at}\n" for at in range(8))
+LARGEST_SLICE = 6000
+"""Instructions of the interpreter, about 35 us where half a period of 8 kHz is 62; a tick of one wall is 1300."""
+
+
+@pytest.mark.parametrize("law", ["tdpa", "energy-cycle"])
+def test_no_slice_of_a_switch_of_eight_walls_costs_more_than_its_share(law: str) -> None:
+    """All that was done in the last slice took 42 613, and missed deadlines at 4 kHz."""
+    walls = [EIGHT, EIGHT.replace("0.00", "0.02"), EIGHT.replace("100.0", "300.0")]
+    start = configured(walls[0] + '[controller]\nlaw = "energy-cycle"\n')
+    bench = Bench(start)
+    slices = []
+    try:
+        for text in walls[1:]:
+            now = configured(text + f'[controller]\nlaw = "{law}"\n')
+            bench.shared.post(switch_request(start, now))
+            while not bench.answered:
+                slices.append(instructions(bench.loop.requests.work))
+            assert bench.shared.verdict() == ""
+            start = now
+        assert len(bench.tick.contacts) == 8
+    finally:
+        bench.close()
+    assert max(slices) <= LARGEST_SLICE
+    assert len(slices) > 30
+
+
+def instructions(call: Callable[[], Any]) -> int:
+    """How many instructions of the interpreter a call takes."""
+    count = 0
+
+    def trace(frame: FrameType, event: str, _argument: Any) -> Any:
+        nonlocal count
+        frame.f_trace_opcodes = True
+        frame.f_trace_lines = False
+        count += event == "opcode"
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        call()
+    finally:
+        sys.settrace(before)
+    return count

@@ -113,6 +113,11 @@ class Rig:
         if arm:
             assert self.tick.arm()
 
+    def switch(self, *what: Any, **named: Any) -> None:
+        """Take another scene, limits or law, without a tick in between."""
+        for _ in self.tick.switch(*what, **named):
+            pass
+
     def at(self, *position_m: float, ticks: int = 1, dt_s: float = PERIOD_S) -> list[list[float]]:
         """Tick with the device at a position; the written forces."""
         written = []

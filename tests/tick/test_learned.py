@@ -33,7 +33,7 @@ def test_what_a_law_declares_as_learned_is_found_by_the_next_one_and_nothing_els
         first, found = learner(learned)
         rig = pressed(module=first)
         second, found_next = learner()
-        rig.tick.switch(make_law=running(second))
+        rig.switch(make_law=running(second))
         assert found[0] == 0.0
         assert found_next == [expected]
 
@@ -57,7 +57,7 @@ def test_the_damping_of_one_sample_is_not_learned() -> None:
         depth_m = 3e-4 if depth_m == 2e-4 else 2e-4
         rig.force(-depth_m)
     told, found = learner()
-    rig.tick.switch(make_law=running(told))
+    rig.switch(make_law=running(told))
     assert found == [0.0]
 
 

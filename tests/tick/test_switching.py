@@ -110,7 +110,7 @@ def test_whatever_is_switched_to_whatever_the_force_is_bounded_and_goes_by_ramps
     force_n = rig.force(device.measured_m, ticks=RAMP_TICKS)
     for law, walls, safety, ticks in path:
         try:
-            tick.switch(
+            rig.switch(
                 None if walls is None else scene(*SCENES[walls]),
                 None if safety is None else SafetyConfig.model_validate(SAFETY[safety]),
                 None if law is None else law_of(law),
@@ -155,7 +155,7 @@ def test_a_debt_is_carried_through_every_switch(
         assert debt_j >= 0.0
         usable = safety in ("the device's", "half the force", "a short ramp")
         limits = SafetyConfig.model_validate(SAFETY[safety]) if safety and usable else None
-        rig.tick.switch(scene(wall(12000.0)), limits, None if law is None else law_of(law))
+        rig.switch(scene(wall(12000.0)), limits, None if law is None else law_of(law))
         (contact,) = rig.tick.contacts
         assert contact.ledger.debt_j == debt_j
         assert contact.snapshot(0.0).debt_j == debt_j

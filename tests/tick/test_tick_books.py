@@ -23,7 +23,7 @@ def test_the_sum_of_all_books_does_not_jump_when_walls_go(new: Any) -> None:
     rig = Rig(wall(2000.0), at_m=0.0)
     for count in range(300):
         if count in (55, 70):
-            rig.tick.switch(new if count == 55 else scene(wall(2000.0)))
+            rig.switch(new if count == 55 else scene(wall(2000.0)))
         rig.force(-3e-3 * math.sin(0.05 * count))
         energy_j, stored_j, dissipated_j, generated_j = rig.books_j
         assert energy_j == pytest.approx(rig.energy_j, abs=1e-12)
@@ -73,13 +73,13 @@ def test_a_debt_is_carried_to_the_next_law_and_a_credit_is_not() -> None:
     watching = running(law(returns(0.0), lambda _state, _params, snapshot: told.append(snapshot)))
     rig = pressed()
     rig.force(-4e-3)
-    rig.tick.switch(make_law=watching)
+    rig.switch(make_law=watching)
     assert rig.books_j[0] > 0.0
     assert told[-1].debt_j == 0.0
     rig = pressed()
     rig.force(-1e-3)
     rig.force(-1e-4)
-    rig.tick.switch(make_law=watching)
+    rig.switch(make_law=watching)
     assert told[-1].debt_j == pytest.approx(-rig.books_j[0])
     assert told[-1].debt_j > 0.0
     assert told[-1].applied_n == pytest.approx(0.2)
@@ -97,7 +97,7 @@ def test_the_damping_that_was_reached_is_told_to_the_next_law() -> None:
     module = law(step, fields={"damping_n_s_per_m": float})
     module.__dict__["LEARNED"] = ("damping_n_s_per_m",)
     rig = pressed(module=module)
-    rig.tick.switch(make_law=running(law(returns(0.0), lambda _state, _params, snapshot: told.append(snapshot))))
+    rig.switch(make_law=running(law(returns(0.0), lambda _state, _params, snapshot: told.append(snapshot))))
     assert told[-1].damping_n_s_per_m == 31.0
 
 

@@ -198,8 +198,8 @@ def test_a_law_that_cannot_start_changes_nothing(error: BaseException) -> None:
     before_n = rig.force(-2e-3)
     contacts = list(rig.tick.contacts)
     deeds: list[Callable[[], None]] = [
-        lambda: rig.tick.switch(make_law=broken),
-        lambda: rig.tick.switch(scene(wall(7.0)), SafetyConfig(max_force_n=2.0, ramp_s=0.5), broken),
+        lambda: rig.switch(make_law=broken),
+        lambda: rig.switch(scene(wall(7.0)), SafetyConfig(max_force_n=2.0, ramp_s=0.5), broken),
     ]
     for deed in deeds:
         with pytest.raises(PluginError, match=r"law tests\.some_law cannot start"):

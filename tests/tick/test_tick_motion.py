@@ -8,7 +8,7 @@ from hapticd.config.models import VelocityConfig
 from hapticd.device import Sample
 from hapticd.errors import ConfigError
 from hapticd.tick.event import EventCode
-from hapticd.tick.tick import FROZEN_S
+from hapticd.tick.motion import FROZEN_S
 from tests.tick.rig import PERIOD_S, Rig, wall
 from tests.tick.transitions import pressed
 

@@ -244,7 +244,7 @@ def test_no_filter_of_the_user_hides_a_device_that_is_too_fast(velocity: dict[st
 def test_a_limit_of_speed_that_comes_later_counts_from_where_the_device_is_then() -> None:
     rig = Rig(at_m=0.0, simulated=True, safety={"profile": "simulation", "max_speed_m_per_s": None})
     rig.force(0.05, ticks=2)
-    rig.tick.switch(safety=SafetyConfig(max_speed_m_per_s=1.0))
+    rig.switch(safety=SafetyConfig(max_speed_m_per_s=1.0))
     rig.force(0.0505)
     assert rig.tick.fault == 0
     rig.force(0.0525)

@@ -84,7 +84,7 @@ def test_a_law_switch_during_a_release_neither_steps_nor_stops_it() -> None:
     rig = pressed(wall(5000.0))
     rig.tick.release()
     forces = rig.forces(-2e-3, 25)
-    rig.tick.switch(make_law=running(pushes(12.0)))
+    rig.switch(make_law=running(pushes(12.0)))
     forces += rig.forces(-2e-3, 30)
     assert forces[24] - forces[25] == pytest.approx(10.0 / RAMP_TICKS)
     assert largest_step(forces) <= 2.0 * RAMP_STEP_N
@@ -94,7 +94,7 @@ def test_a_law_switch_during_a_release_neither_steps_nor_stops_it() -> None:
 
 def test_a_stop_in_the_middle_of_a_blend_is_over_in_its_own_time() -> None:
     rig = pressed()
-    rig.tick.switch(scene(wall(6000.0)))
+    rig.switch(scene(wall(6000.0)))
     forces = rig.forces(-2e-3, 20)
     rig.tick.release(0.02)
     forces += rig.forces(-2e-3, 21)
@@ -107,7 +107,7 @@ def test_a_smaller_limit_in_the_middle_of_a_release_is_no_step() -> None:
     rig = pressed(wall(6000.0))
     rig.tick.release()
     forces = rig.forces(-2e-3, 25)
-    rig.tick.switch(safety=SafetyConfig(max_force_n=1.0))
+    rig.switch(safety=SafetyConfig(max_force_n=1.0))
     forces += rig.forces(-2e-3, 25)
     assert forces[24] == pytest.approx(6.0)
     assert largest_step(forces) <= 2.0 * RAMP_STEP_N
@@ -127,10 +127,10 @@ def test_a_fault_in_the_middle_of_a_release_latches_and_the_release_goes_on() ->
 
 def test_at_the_tick_of_a_law_switch_the_force_moves_as_the_device_did_and_no_further() -> None:
     rig = pressed()
-    rig.tick.switch(make_law=running(pushes(11.0)))
+    rig.switch(make_law=running(pushes(11.0)))
     assert rig.force(-2e-3) == 4.0
     rig = pressed()
-    rig.tick.switch(make_law=running(pushes(11.0)))
+    rig.switch(make_law=running(pushes(11.0)))
     assert rig.force(-1.5e-3) == pytest.approx(3.0)
 
 
@@ -203,7 +203,7 @@ def test_an_unchanged_wall_keeps_its_clock_its_law_and_its_books_wherever_it_sta
     rig = pressed(wall(100.0, position_m=-1.0), changing, depth_m=1e-3, simulated=True)
     kept = rig.tick.contacts[1]
     rig.force(-1e-3, ticks=10)
-    rig.tick.switch(scene(changing, wall(300.0, position_m=-2.0)))
+    rig.switch(scene(changing, wall(300.0, position_m=-2.0)))
     assert rig.tick.contacts[0] is kept
     assert rig.forces(-1e-3, 18) == [2.0] * 18
     assert rig.forces(-1e-3, 1) == [4.0]
@@ -213,7 +213,7 @@ def test_a_wall_that_changed_in_place_keeps_law_and_books_and_starts_its_clock_a
     rig = pressed(module=energy_cycle)
     contact = rig.tick.contacts[0]
     law_before, energy_j = contact.law, contact.ledger.energy_j
-    rig.tick.switch(scene(wall(1000.0, changes=[{"at_s": 0.1, "stiffness_n_per_m": 3000.0}])))
+    rig.switch(scene(wall(1000.0, changes=[{"at_s": 0.1, "stiffness_n_per_m": 3000.0}])))
     assert rig.tick.contacts == [contact]
     assert contact.law is law_before
     assert contact.ledger.energy_j == energy_j
@@ -226,7 +226,7 @@ def test_a_wall_that_changed_in_place_keeps_law_and_books_and_starts_its_clock_a
 def test_of_two_equal_walls_each_finds_itself() -> None:
     rig = Rig(wall(100.0), wall(100.0))
     before = list(rig.tick.contacts)
-    rig.tick.switch(scene(wall(100.0), wall(100.0)))
+    rig.switch(scene(wall(100.0), wall(100.0)))
     assert rig.tick.contacts == before
 
 
@@ -234,7 +234,7 @@ def test_a_scene_that_does_not_fit_changes_nothing() -> None:
     rig = pressed()
     contacts = list(rig.tick.contacts)
     with pytest.raises(ConfigError, match=r"scene\.walls\[1\]"):
-        rig.tick.switch(scene(wall(9.0), wall(9.0, "x")))
+        rig.switch(scene(wall(9.0), wall(9.0, "x")))
     assert rig.tick.contacts == contacts
     assert rig.force(-2e-3) == 4.0
 
@@ -242,14 +242,14 @@ def test_a_scene_that_does_not_fit_changes_nothing() -> None:
 def test_a_limit_that_does_not_fit_changes_nothing() -> None:
     rig = pressed()
     with pytest.raises(ConfigError, match="max_force_n"):
-        rig.tick.switch(scene(wall(9.0)), SafetyConfig(max_force_n=500.0), running(pushes(1.0)))
+        rig.switch(scene(wall(9.0)), SafetyConfig(max_force_n=500.0), running(pushes(1.0)))
     assert rig.force(-2e-3) == 4.0
 
 
 def test_a_scene_that_comes_during_the_fallback_gets_the_fallback() -> None:
     rig = pressed()
     rig.tick.fail_law(EventCode.LAW_OVER_BUDGET, "slow")
-    rig.tick.switch(scene(wall(1000.0), wall(2000.0, position_m=-1.0)), None, running(pushes(-5.0)))
+    rig.switch(scene(wall(1000.0), wall(2000.0, position_m=-1.0)), None, running(pushes(-5.0)))
     assert {contact.law.module.__name__ for contact in rig.tick.contacts} == {"hapticd.tick.fallback"}
     rig.force(-2e-3, ticks=60)
     rig.tick.guard.clear()

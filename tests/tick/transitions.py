@@ -29,20 +29,20 @@ def arm_again(rig: Rig) -> None:
 
 
 TRANSITIONS: dict[str, tuple[Callable[[Rig], Any], float]] = {
-    "another law": (lambda rig: rig.tick.switch(make_law=running(pushes(11.0))), 11.0),
-    "a law that pulls": (lambda rig: rig.tick.switch(make_law=running(pushes(-12.0))), -12.0),
-    "a law beyond the limit": (lambda rig: rig.tick.switch(make_law=running(pushes(1e6))), 12.0),
-    "a softer wall": (lambda rig: rig.tick.switch(scene(wall(500.0))), 1.0),
-    "a stiffer wall": (lambda rig: rig.tick.switch(scene(wall(1e6))), 12.0),
-    "no wall": (lambda rig: rig.tick.switch(scene()), 0.0),
-    "a wall elsewhere": (lambda rig: rig.tick.switch(scene(wall(1000.0, position_m=3e-3))), 5.0),
-    "a second wall": (lambda rig: rig.tick.switch(scene(wall(2000.0), wall(1e5, position_m=1.0))), 12.0),
+    "another law": (lambda rig: rig.switch(make_law=running(pushes(11.0))), 11.0),
+    "a law that pulls": (lambda rig: rig.switch(make_law=running(pushes(-12.0))), -12.0),
+    "a law beyond the limit": (lambda rig: rig.switch(make_law=running(pushes(1e6))), 12.0),
+    "a softer wall": (lambda rig: rig.switch(scene(wall(500.0))), 1.0),
+    "a stiffer wall": (lambda rig: rig.switch(scene(wall(1e6))), 12.0),
+    "no wall": (lambda rig: rig.switch(scene()), 0.0),
+    "a wall elsewhere": (lambda rig: rig.switch(scene(wall(1000.0, position_m=3e-3))), 5.0),
+    "a second wall": (lambda rig: rig.switch(scene(wall(2000.0), wall(1e5, position_m=1.0))), 12.0),
     "a release": (lambda rig: rig.tick.release(), 0.0),
     "a fault": (lambda rig: rig.tick.fail(EventCode.DEVICE_FAULT, "hot"), 0.0),
     "the fallback": (lambda rig: rig.tick.fail_law(EventCode.LAW_OVER_BUDGET, "slow"), 0.0),
-    "a smaller limit": (lambda rig: rig.tick.switch(safety=SafetyConfig(max_force_n=1.0)), 1.0),
+    "a smaller limit": (lambda rig: rig.switch(safety=SafetyConfig(max_force_n=1.0)), 1.0),
     "everything": (
-        lambda rig: rig.tick.switch(scene(wall(9000.0)), SafetyConfig(max_force_n=6.0), running(pushes(1e9))),
+        lambda rig: rig.switch(scene(wall(9000.0)), SafetyConfig(max_force_n=6.0), running(pushes(1e9))),
         6.0,
     ),
 }

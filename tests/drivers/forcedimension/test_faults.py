@@ -15,7 +15,8 @@ from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DriverErro
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
-from hapticd.tick.tick import FROZEN_S, ControlTick
+from hapticd.tick.motion import FROZEN_S
+from hapticd.tick.tick import ControlTick
 from hapticd_drivers.forcedimension.driver import ForceDimension
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, Bench
 
