@@ -31,6 +31,7 @@ LIMIT = 1e12  # a quotient that is kept grows no further, in SI units; what is o
 TINY_MOTION = 1e-24  # a cycle with less sum of v^2 dt [m^2/s] is rest: there is nothing to divide by
 FELT_SAMPLES = 20.0  # effective samples before an identified mass is believed
 LEAST_PUSH = 0.005  # negative friction beyond this share of mass / dt is a force one sample late, not an active device
+LEAST_EXCITATION = 1e-3  # forces that vary less, as a share of their mean square, tell rounding and not a mass
 FELT_COUNTS = 2.0  # a shorter move, in counts of the position, says more about the quantiser than about the mass
 
 
@@ -338,9 +339,9 @@ def _believe(state: Any, params: Any) -> None:
         braked = pushed * state.period_s <= LEAST_PUSH * variance * variance_s
     explained = 0.0
     late_explained = 0.0
-    if variance > 0.0 and covariance > 0.0:
+    if variance > LEAST_EXCITATION * state.sum_uu and covariance > 0.0:
         explained = covariance * covariance / variance
-    if late_variance > 0.0 and late_covariance > 0.0:
+    if late_variance > LEAST_EXCITATION * state.late_sum_uu and late_covariance > 0.0:
         late_explained = late_covariance * late_covariance / late_variance
     if params.force_delay == FORCE_DELAY_IDENTIFIED and (explained > 0.0 or late_explained > 0.0):
         state.forces_late = late_explained > explained or not braked

@@ -141,6 +141,34 @@ def test_mass_and_delay_are_felt(mass_kg: float, delay_samples: int) -> None:
     assert rig.state.forces_late == bool(delay_samples)
 
 
+@pytest.mark.parametrize("learned", [True, False])
+def test_no_mass_is_read_from_forces_that_do_not_vary(learned: bool) -> None:
+    """20 s of a hand that moves against the 12 N of the limit: 0.25 kg read 2066 kg, and the cap was none."""
+    rig = Rig(energy_cycle, Device(resolution_m=2e-6, stiffness_n_per_m=10e3))
+    if learned:
+        rig.run(3.0)
+        assert rig.state.felt_mass_kg == pytest.approx(0.25, rel=0.2)
+    tick, state = rig.tick, rig.state
+    tick.in_contact = True
+    tick.applied_n = tick.applied_contact_n = tick.contact_n = tick.spring_n = 12.0
+    last_m = tick.x_m
+    believed = []
+    for count in range(20_000):
+        at_m = -5e-3 + 2e-3 * math.sin(2.0 * math.pi * 3.0 * count * 1e-3)
+        tick.x_m = round(at_m / 2e-6) * 2e-6
+        tick.moved_m = tick.x_m - last_m
+        tick.velocity_m_per_s = tick.moved_m / tick.dt_s
+        last_m = tick.x_m
+        rig.law.step(state, rig.params, tick)
+        believed.append(state.felt_mass_kg)
+    assert state.count > 100.0
+    if learned:
+        assert max(believed) < 0.5
+        assert min(believed) > 0.1
+    else:
+        assert set(believed) == {0.0}
+
+
 def test_a_quantised_rest_winds_up_no_damping() -> None:
     """Counts flicker for ever: without the bound of small cycles the damping climbs to its cap, and hums."""
     device = Device(viscous_n_s_per_m=4.0)
