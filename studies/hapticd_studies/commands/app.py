@@ -20,6 +20,10 @@ app = lazy_group(
             f"{_COMMANDS}.robustness:command",
             "Press random devices into random walls under every law, and count which settle.",
         ),
+        "transparency": (
+            f"{_COMMANDS}.transparency:command",
+            "Let hands move on random devices under every law, and score what they are given and feel.",
+        ),
         "accuracy": (
             f"{_COMMANDS}.accuracy:command",
             "Measure what every shortcut costs in accuracy, and what every bit of accuracy costs in time.",
