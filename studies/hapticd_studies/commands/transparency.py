@@ -70,7 +70,8 @@ def command(
         console.print()
         console.print(figures(device, chosen, seconds, Criterion()))
         if output is not None:
-            for path in write_files(device, chosen, seconds, Criterion(), output):
+            drawn = parse_laws(QUICK, {}) if laws == "all" else chosen
+            for path in write_files(device, drawn, seconds, Criterion(), output):
                 console.print(str(path), soft_wrap=True, markup=False)
         return
 

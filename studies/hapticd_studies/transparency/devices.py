@@ -25,9 +25,9 @@ HARDEST = 0.8
 
 DRAWN = (
     "mass 0.02-5 kg, viscous friction 4-24 /s of it, position steps of 1-30 um, 0.5-4 kHz, delay of 0, 1 or 2 samples, "
-    "1 in 3 with an actuator corner at 0.15-0.6 of the rate, half with sensor noise of 0.2-4 um; a hand of up to 0.1 kg, "
-    "0.3-1.5 N s/m and 40-200 N/m; wall of 0.2-5 times what device and hand hold by themselves, at most 0.8 of the "
-    "damper peak; force limit 12 N"
+    "1 in 3 with an actuator corner at 0.15-0.6 of the rate, half with sensor noise of 0.2-4 um; a hand of up to "
+    "0.1 kg, 0.3-1.5 N s/m and 40-200 N/m; wall of 0.2-5 times what device and hand hold by themselves, at "
+    "most 0.8 of the damper peak; force limit 12 N"
 )
 
 

@@ -132,11 +132,12 @@ def _sine(mean_n: float, swing_n: float, frequency_hz: float, duration_s: float)
     found = Movement()
     found.change(mean_n, _ARRIVAL_S)
     per_s = frequency_hz * _PER_TURN
-    for at in range(1, math.ceil(duration_s * per_s) + 1):
-        if at % (_PER_TURN // 2) == _PER_TURN // 4 or at == 1:  # a turn of the force: from here it eases, or presses
+    for at in range(math.ceil(duration_s * per_s) + 1):
+        if at % (_PER_TURN // 2) == _PER_TURN // 4 or at == 0:  # a turn of the force: from here it eases, or presses
             eases = math.cos(math.tau * (at + 0.5) / _PER_TURN) > 0.0
             found.phases.append((_ARRIVAL_S + at / per_s, OUT if eases else IN))
-        found.points.append((_ARRIVAL_S + at / per_s, mean_n + swing_n * math.sin(math.tau * at / _PER_TURN)))
+        if at > 0:
+            found.points.append((_ARRIVAL_S + at / per_s, mean_n + swing_n * math.sin(math.tau * at / _PER_TURN)))
     return found
 
 

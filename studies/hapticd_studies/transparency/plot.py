@@ -44,19 +44,17 @@ def draw(report: TransparencyReport) -> bytes:
         return style.png(figure)
 
 
-def draw_one(title: str, time_s: Any, ideal_n: Any, runs: Sequence[tuple[str, Any, Any]]) -> bytes:
+def draw_one(title: str, time_s: Any, runs: Sequence[tuple[str, Any, Any]]) -> bytes:
     """One device under its hand.
 
     Args:
         title: what it is.
         time_s: of the samples.
-        ideal_n: force of an ideal spring at the position of the first run [N].
         runs: of each law its label, true position and force.
     """
     with style.applied():
         figure, axes = style.figure(7.2, 5.2, 2, 1, sharex=True)
         above, below = axes[0][0], axes[1][0]
-        below.plot(time_s, ideal_n, color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)), label="ideal spring")
         for at, (label, x_m, force_n) in enumerate(runs):
             colour = style.SERIES[at % len(style.SERIES)]
             above.plot(time_s[: len(x_m)], x_m * 1e3, color=colour, linewidth=0.9)
@@ -100,16 +98,12 @@ def _dots(
                     color=colour,
                 )
     panel.set_xscale("log")
-    if found:
-        low, high = min(found), max(found)
-        panel.set_xlim((zero or low) / 1.6, max(high, 10.0 * (zero or low)) * 1.8)
-    style.plain_ticks(panel.xaxis, (1.0,))
-    if zero:
-        ticks = [
-            at for at in panel.get_xticks() if at > 1.001 * zero and panel.get_xlim()[0] < at < panel.get_xlim()[1]
-        ]
-        panel.set_xticks([zero, *ticks], ["0", *(f"{at:g}" for at in ticks)])
-        panel.minorticks_off()
+    low, high = (min(found), max(found)) if found else (1.0, 1.0)
+    low, high = zero or low / 1.5, max(high, 10.0 * (zero or low / 1.5))
+    panel.set_xlim(low / 1.6, high * 1.8)
+    decades = [10.0**at for at in range(-6, 7) if low * 1.001 < 10.0**at < high * 1.8]
+    panel.set_xticks([zero, *decades] if zero else decades, ["0"] * bool(zero) + [f"{at:g}" for at in decades])
+    panel.minorticks_off()
     if bar is not None:
         panel.axvline(bar, color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)))
     panel.set_xlabel(label)

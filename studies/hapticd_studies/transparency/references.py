@@ -31,7 +31,7 @@ def references(devices: Sequence[Held], criterion: Criterion, threads: int | Non
     """The row of each device, in the order of `COLUMNS`."""
     least = least_damping(devices, criterion, threads)
     hard, gentle = (_best_s(devices, how, criterion, threads) for how in (HARD, GENTLE))
-    return np.array([least, hard, gentle]).T.tolist()
+    return [list(map(float, row)) for row in zip(least, hard, gentle, strict=True)]
 
 
 def least_damping(devices: Sequence[Held], criterion: Criterion, threads: int | None = None) -> Array:
@@ -76,7 +76,8 @@ def calm(devices: Sequence[Held], damping: Array, criterion: Criterion, threads:
         == Outcome.SETTLED
         for at, (how, device, _) in enumerate(tried)
     ]
-    return np.logical_and.reduce(np.array(held, dtype=bool).reshape(len(PRESSES_N), -1))
+    every: Bools = np.min(np.array(held, dtype=bool).reshape(len(PRESSES_N), -1), axis=0)
+    return every
 
 
 def _best_s(devices: Sequence[Held], how: Arrival, criterion: Criterion, threads: int | None) -> Array:

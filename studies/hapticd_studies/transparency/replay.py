@@ -16,11 +16,11 @@ from hapticd.offline.outcome import Criterion
 from hapticd.simulation.batch import TRACE_COLUMNS
 from hapticd_studies.grid.output import as_csv, write
 from hapticd_studies.law_spec import LawSpec
-from hapticd_studies.transparency.devices import MAX_FORCE_N, Held, draw
+from hapticd_studies.transparency.devices import Held, draw
 from hapticd_studies.transparency.plot import draw_one
 from hapticd_studies.transparency.references import COLUMNS, references
 from hapticd_studies.transparency.report import figures_of
-from hapticd_studies.transparency.runs import columns_of, moving_runs, rows
+from hapticd_studies.transparency.runs import columns_of, moving_runs, rows, times_of
 
 _PICTURED_S = 3.0
 
@@ -58,7 +58,7 @@ def write_files(
     """Write the device as a configuration, and its run under each law as CSV and picture."""
     stem = f"device-{device.seed}-{device.index}"
     ticks = round(duration_s / device.period_s)
-    time_s = (np.arange(ticks) + 1.0) * device.period_s
+    time_s = times_of(device, ticks)
     names, found, runs = ["t_s"], [time_s], []
     for law in laws:
         columns: list[Any] = columns_of(moving_runs([device], law, duration_s, criterion), 0)
@@ -66,7 +66,6 @@ def write_files(
         found += [np.pad(column, (0, ticks - len(column)), constant_values=np.nan) for column in columns]
         runs.append((law.label, found[-6], found[-3]))
     pictured = round(min(_PICTURED_S, duration_s) / device.period_s)
-    ideal_n = np.clip(-device.stiffness_n_per_m * runs[0][1], 0.0, MAX_FORCE_N)
     title = (
         f"{device.name}: {device.kind}, {device.mass_kg:.2g} kg, {device.stiffness_n_per_m / 1e3:.2g} kN/m "
         f"({device.own_share:.2g} of its own limit), {device.rate_hz:.0f} Hz"
@@ -74,9 +73,7 @@ def write_files(
     contents = {
         f"{stem}.toml": device.config(laws[-1].name, duration_s).encode(),
         f"{stem}.csv": as_csv(names, np.array(found).T.tolist()),
-        f"{stem}.png": draw_one(
-            title, time_s[:pictured], ideal_n[:pictured], [(name, x[:pictured], f[:pictured]) for name, x, f in runs]
-        ),
+        f"{stem}.png": draw_one(title, time_s[:pictured], [(name, x[:pictured], f[:pictured]) for name, x, f in runs]),
     }
     for name, content in contents.items():
         write(folder / name, content)

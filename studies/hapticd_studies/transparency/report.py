@@ -32,7 +32,8 @@ AT_REST_WORDS = (
 MOVING_WORDS = (
     "damp./need: damping weighted by its work over max(1.5 times the least constant damper, kT/2); base: at most that "
     "after the hand; work/leak: of the law over (k/2) sum dx^2; in, hold, out: force error; pulls: exits with a pull "
-    "of more than 7 % of the push; leave: time to leave over that without a law, on walls that need none; k: shown at 2 Hz"
+    "of more than 7 % of the push; leave: time to leave over that without a law, on walls that need none; k: "
+    "shown at 2 Hz"
 )
 """What the heads of the tables mean."""
 

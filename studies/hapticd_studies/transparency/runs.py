@@ -100,12 +100,17 @@ def phases_at(device: Held, duration_s: float, time_s: Array) -> tuple[npt.NDArr
     return kinds[order][at], found.releases
 
 
+def times_of(device: Held, ticks: int) -> Array:
+    """When each sample of a trace was taken [s]."""
+    return np.arange(1, ticks + 1, dtype=np.float64) * device.period_s
+
+
 def _moving(devices: Sequence[Held], law: LawSpec, duration_s: float, result: BatchResult) -> list[Row]:
     names = state_fields(law.law)
     found = []
     for at, device in enumerate(devices):
         true_m, v, x_m, force, _, damping = columns_of(result, at)
-        time_s = (np.arange(len(true_m)) + 1.0) * device.period_s
+        time_s = times_of(device, len(true_m))
         phases, releases = phases_at(device, duration_s, time_s)
         base = math.nan
         if "base_n_s_per_m" in names:
@@ -185,7 +190,7 @@ def _shown(device: Held, result: BatchResult, at: int, hz: float) -> complex:
     if not result.finite[at]:
         return complex(math.nan, math.nan)
     true_m, _, _, pushed, _, _ = columns_of(result, at)
-    time_s = (np.arange(len(true_m)) + 1.0) * device.period_s
+    time_s = times_of(device, len(true_m))
     first = round(PROBE_FROM_S / device.period_s)
     return scores.impedance(true_m[first:], pushed[first:], time_s[first:], hz)
 
