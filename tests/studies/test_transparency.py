@@ -311,6 +311,7 @@ def test_a_quick_run_writes_a_line_a_law_and_device(quick: Path) -> None:
     assert of_all["none"]["held"] < 0.5 < of_all["ring-damping"]["held"]
     assert of_all["none"]["exits_felt"] == 0.0 < of_all["damper"]["exits_felt"]
     assert of_all["none"]["leaving"] == 1.0
+    assert all(one["unfelt"] <= one["held"] <= one["still"] for one in of_all.values())
     assert (quick / "transparency.png").read_bytes().startswith(b"\x89PNG")
     assert not (quick / "transparency.journal").exists()
 

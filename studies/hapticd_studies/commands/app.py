@@ -22,7 +22,7 @@ app = lazy_group(
         ),
         "transparency": (
             f"{_COMMANDS}.transparency:command",
-            "Let hands move on random devices under every law, and score what they are given and feel.",
+            "Let hands move on random devices under every law, and score what they are given and what they feel.",
         ),
         "accuracy": (
             f"{_COMMANDS}.accuracy:command",

@@ -33,9 +33,10 @@ def command(
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,
 ) -> None:
-    """Let hands press, tap, stroke, tremble, hold, regrip and let go under every law, and score what they are given.
+    """Let hands move on random devices under every law, and score what they are given and what they feel.
 
-    Random devices before walls of 0.2 to 5 times what they hold by themselves. Force errors, pulls, work over the leak,
+    They press, tap, stroke, tremble, hold, regrip and let go, on walls of 0.2 to 5 times what a device holds by itself.
+    Force errors, pulls, work over the leak,
     damping over the least that holds (by bisection), settling over the best constant damper, displayed stiffness, and
     what of the rest is felt. Writes a picture, CSV and JSON. Interrupted, the same command goes on where it was.
 
@@ -54,7 +55,9 @@ def command(
         raise ConfigError(f"--seconds {seconds:g}: must be from 1 to {_MOST_SECONDS:g}")
     if not 0 <= seed < 10**18:
         raise ConfigError(f"--seed {seed}: must be 0 or more and less than 1e18")
-    chosen = parse_laws(QUICK if quick else laws, {}) if quick or laws != "all" else every_law()
+    if quick and laws == "all":
+        laws = QUICK
+    chosen = every_law() if laws == "all" else parse_laws(laws, {})
 
     from hapticd.offline.outcome import Criterion
 

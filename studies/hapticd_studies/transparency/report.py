@@ -25,14 +25,15 @@ from hapticd_studies.transparency.sweep import TransparencyPlan
 Array = npt.NDArray[np.float64]
 
 AT_REST_WORDS = (
-    "held: still and in place after a hard and a gentle arrival, without and with one or two samples of delay; of "
-    "those, at the gentle one: unfelt, felt index at most 1; felt, its median; chatter of the force; hard, gentle: "
-    "settling time over that of the best constant damper; rate: rate-hardness over k"
+    "held [%]: still and in place after a hard and a gentle arrival, without delay and late by one or two samples; "
+    "still [%]: wherever; unfelt [%]: held with a felt index of at most 1; of those held, after the gentle one: felt, "
+    "the median of that index; chatter of the force [N]; hard, gentle: settling time over that of the best constant "
+    "damper; rate: rate-hardness over k"
 )
 MOVING_WORDS = (
-    "damp./need: damping weighted by its work over max(1.5 times the least constant damper, kT/2); base: at most that "
-    "after the hand; work/leak: of the law over (k/2) sum dx^2; in, hold, out: force error; pulls: exits with a pull "
-    "of more than 7 % of the push; leave: time to leave over that without a law, on walls that need none; k: "
+    "need: damping weighted by its work over max(1.5 times the least constant damper, kT/2); base [%]: at most that "
+    "after the hand; work: of the law over (k/2) sum dx^2; in, hold, out: force error [%]; pulls [%]: exits with a "
+    "pull of more than 7 % of the push; leave: time to leave over that without a law, on walls that need none; k [%]: "
     "shown at 2 Hz"
 )
 """What the heads of the tables mean."""
@@ -61,11 +62,11 @@ class TransparencyReport:
 
     def at_rest(self) -> Table:
         """For the terminal: what becomes of hands that come to stay."""
-        shown = _table("held %", "late %", "unfelt %", "felt", "chatter N", "hard", "gentle", "rate")
+        shown = _table("held", "late", "still", "unfelt", "felt", "chatter", "hard", "gentle", "rate")
         for one, prompt, late in self._lines("no delay", "late"):
             shown.add_row(
                 _label(one.law),
-                *(_number(100.0 * value) for value in (prompt.held, late.held, one.unfelt)),
+                *(_number(100.0 * value) for value in (prompt.held, late.held, one.still, one.unfelt)),
                 *(_number(value) for value in (one.felt, one.chatter_n)),
                 *(_number(value) for value in (one.settles_hard, one.settles_gentle, one.hardness)),
             )
@@ -73,7 +74,7 @@ class TransparencyReport:
 
     def moving(self) -> Table:
         """For the terminal: what hands that move are given."""
-        shown = _table("damp. need", "base %", "work leak", "in %", "hold %", "out %", "pulls %", "leave", "k %")
+        shown = _table("need", "base", "work", "in", "hold", "out", "pulls", "leave", "k")
         for one in self.summaries["all"]:
             shown.add_row(
                 _label(one.law),

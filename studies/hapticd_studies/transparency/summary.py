@@ -32,7 +32,8 @@ class LawSummary:
         law: its label.
         devices: how many.
         held: share that is still and in place after a hard and after a gentle arrival.
-        unfelt: share of the held ones whose rest after a gentle arrival has a felt index of at most 1.
+        still: the same, whether in place or not.
+        unfelt: share that is held and whose rest after a gentle arrival has a felt index of at most 1.
         felt: median of that index over the held ones.
         chatter_n: median span of the force at that rest, over the held ones [N].
         misplaced: largest error of the depth at that rest, over the held ones, a share.
@@ -44,7 +45,7 @@ class LawSummary:
         error: median force error while the hand presses more, stays, and eases.
         pull_share: mean share of the ticks in contact with a pull.
         pull_worst_n: the largest pull [N].
-        exits_felt: share of the exits with a pull of more than 7 % of the push before.
+        exits_felt: mean over the devices of the share of exits with a pull of more than 7 % of the push before.
         leaving: median time from letting go to leaving, over that without a law, on walls that need none.
         shown: median displayed stiffness over that of the wall, at each frequency of the probes.
         shown_damping: median displayed damping over k T / 2, at each of them.
@@ -54,6 +55,7 @@ class LawSummary:
     law: str
     devices: int
     held: float
+    still: float
     unfelt: float
     felt: float
     chatter_n: float
@@ -96,16 +98,18 @@ def summary(
     leak = np.array([device.leak_n_s_per_m for device in devices])
     need = np.maximum(ROOM * dampers[:, 0], leak)
     over = column["weighted_n_s_per_m"] / need
-    held = (column["hard_outcome"] == Outcome.SETTLED) & (column["gentle_outcome"] == Outcome.SETTLED)
+    ended = column["hard_outcome"], column["gentle_outcome"]
+    held = np.maximum(*ended) == Outcome.SETTLED
     resting = group & held
     based = group & np.isfinite(column["base_n_s_per_m"])
-    exits = float(column["exits"][group].sum())
+    left = group & (column["exits"] > 0.0)
     shown = [f"{hz:g}hz" for together in PROBES_HZ for hz in together]
     return LawSummary(
         law,
         int(group.sum()),
         held=_share(held[group]),
-        unfelt=_share(column["gentle_felt"][resting] <= FELT),
+        still=_share((np.maximum(*ended) <= Outcome.ELSEWHERE)[group]),
+        unfelt=_share((held & (column["gentle_felt"] <= FELT))[group]),
         felt=_median(column["gentle_felt"][resting]),
         chatter_n=_median(column["gentle_chatter_n"][resting]),
         misplaced=float(np.abs(column["gentle_misplaced_share"][resting]).max()) if resting.any() else math.nan,
@@ -122,7 +126,7 @@ def summary(
         ),
         pull_share=_mean(column["pull_share"][group]),
         pull_worst_n=float(np.nanmax(column["pull_worst_n"][group], initial=0.0)),
-        exits_felt=float(column["exits_felt"][group].sum()) / exits if exits else math.nan,
+        exits_felt=_mean(column["exits_felt"][left] / column["exits"][left]),
         leaving=math.nan if undamped is None else _leaving(devices, table, undamped, group),
         shown=tuple(_median(column[f"shown_share_{hz}"][group]) for hz in shown),
         shown_damping=tuple(_median((column[f"shown_n_s_per_m_{hz}"] / leak)[group]) for hz in shown),
