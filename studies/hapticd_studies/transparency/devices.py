@@ -88,7 +88,7 @@ class Held:
         return self.stiffness_n_per_m / self.own_n_per_m
 
     def movement(self, duration_s: float) -> Movement:
-        """What the hand does, for at least so long."""
+        """What the hand does, for at least this long."""
         hand = self.options.hand
         grip = {
             "hand_mass_kg": hand.mass_kg,

@@ -70,7 +70,7 @@ def movement(kind: str, source: Random, duration_s: float, grip: dict[str, float
     Args:
         kind: one of `KINDS`.
         source: of all that is drawn.
-        duration_s: at least so long [s].
+        duration_s: it lasts at least this [s].
         grip: `hand_mass_kg`, `hand_damping_n_s_per_m`, `hand_stiffness_n_per_m` of the hand.
     """
     if kind == "stroke":  # presses and eases without leaving

@@ -65,7 +65,7 @@ COLUMNS = (
 
 
 def seconds_of(duration_s: float) -> float:
-    """Simulated time of a device under a law, with hands that move for so long [s]."""
+    """Simulated time of a device under a law whose hand moves for `duration_s` [s]."""
     return duration_s + (2 + len(PROBES_HZ)) * arrivals.DURATION_S
 
 
