@@ -35,7 +35,7 @@ def test_the_record_has_what_the_wall_is_at_every_tick(at_s: set[float]) -> None
     alone = Wall(WallConfig.model_validate(config), 0, PERIOD_S)
     for _ in range(40):
         if alone.changes_left:
-            alone.count_tick()
+            alone.pass_time(1.0)
         assert recorded(rig) == [alone.stiffness_n_per_m]
 
 
@@ -43,7 +43,7 @@ def test_a_wall_that_stays_keeps_its_clock_and_another_one_starts_its_own() -> N
     stays, other = changing(1.0, 0.01), changing(2.0, 0.01, position_m=-0.01)
     rig = Rig(stays)
     recorded(rig, 8)
-    rig.tick.switch(scene(other, stays))
+    rig.switch(scene(other, stays))
     assert recorded(rig, 2) == [2.0, 1.0]
     assert recorded(rig) == [2.0, 0.0], "ten ticks after its own first one"
     assert recorded(rig, 7) == [2.0, 0.0]
@@ -54,6 +54,6 @@ def test_two_equal_walls_have_a_clock_each() -> None:
     same = changing(1.0, 0.01)
     rig = Rig(same)
     recorded(rig, 10)
-    rig.tick.switch(scene(same, same))
+    rig.switch(scene(same, same))
     assert recorded(rig) == [0.0, 1.0]
     assert recorded(rig, 10) == [0.0, 0.0]
