@@ -31,7 +31,7 @@ LIMIT = 1e12  # a quotient that is kept grows no further, in SI units; what is o
 TINY_MOTION = 1e-24  # a cycle with less sum of v^2 dt [m^2/s] is rest: there is nothing to divide by
 FELT_SAMPLES = 20.0  # effective samples before an identified mass is believed
 LEAST_PUSH = 0.005  # negative friction beyond this share of mass / dt is a force one sample late, not an active device
-LEAST_EXCITATION = 1e-3  # forces that vary less, as a share of their mean square, tell rounding and not a mass
+LEAST_EXCITATION = 1e-4  # forces that vary less, as a share of their mean square, tell rounding and not a mass
 FELT_COUNTS = 2.0  # a shorter move, in counts of the position, says more about the quantiser than about the mass
 
 
