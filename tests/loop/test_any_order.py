@@ -247,6 +247,26 @@ class AnyOrder(RuleBasedStateMachine):
 
     @precondition(lambda self: self.asked is None)
     @rule()
+    def arm_and_disarm(self) -> None:
+        """Before the loop looks at either."""
+        self.arm()
+        self.disarm()
+
+    @precondition(lambda self: self.asked is None)
+    @rule()
+    def mend_and_arm(self) -> None:
+        """A healthy device, cleared and armed, lets forces through."""
+        self.driver.frozen, self.driver.fate, self.driver.read_s = False, None, 0.0
+        self.driver.sample.position_m[0] = -3e-3
+        self.ticks(100)
+        self.clear()
+        self.ticks(2)
+        self.arm()
+        self.ticks(2)
+        assert self.tick.guard.mode is Mode.ARMED
+
+    @precondition(lambda self: self.asked is None)
+    @rule()
     def clear(self) -> None:
         self.ask({"do": "clear"})
 
