@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import re
 import subprocess
 import sys
@@ -85,6 +86,10 @@ def _execute(block: Block, namespace: dict[str, Any]) -> None:
 
 def _command(line: str, block: Block) -> None:
     name, *arguments = line.split()
+    if name == "export":
+        key, _, value = line.removeprefix("export ").partition("=")
+        os.environ[key] = os.pathsep.join([value.replace("$PWD", str(Path.cwd())), os.environ.get(key, "")])
+        return
     if name not in PROGRAMS:
         sys.exit(f"docs/python.md:{block.line}: {line}: a console block runs {', '.join(sorted(PROGRAMS))} only")
     command = [sys.executable, *([] if name == "python" else ["-m", name]), *arguments]

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import hapticd
+import hapticd_studies
 from hapticd import plugins
 from hapticd.version import __version__
 from hapticd_studies.grid.journal import Row
@@ -61,9 +62,12 @@ def in_order(sizes: Sequence[int], blocks: Sequence[list[Row]]) -> list[Row]:
 
 @lru_cache(maxsize=8)
 def code_digest(laws: tuple[str, ...]) -> str:
-    """A hash of every source that may decide about the results: all of hapticd's, and the laws'."""
-    package = Path(hapticd.__file__).parent
-    found = [(str(file.relative_to(package)), file.read_bytes()) for file in sorted(package.rglob("*.py"))]
+    """A hash of every source that may decide about the results: all of hapticd's, the studies' and the laws'."""
+    found = [
+        (f"{package.name}/{file.relative_to(package)}", file.read_bytes())
+        for package in (Path(hapticd.__file__).parent, Path(hapticd_studies.__file__).parent)
+        for file in sorted(package.rglob("*.py"))
+    ]
     found += [(law, Path(inspect.getfile(plugins.law(law))).read_bytes()) for law in sorted(laws)]
     digest = hashlib.sha256(__version__.encode())
     for name, source in found:
