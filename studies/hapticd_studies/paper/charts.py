@@ -7,10 +7,11 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from hapticd.offline.outcome import PRESSED
-from hapticd_studies.paper.claims import HELD, Evidence
-from hapticd_studies.paper.starts import HANDS_N, NATIVE_N_PER_M, OSCILLATES_M
+from hapticd.offline.outcome import PRESSED, Criterion
+from hapticd_studies.paper.claims import HELD, OFF_COUNT, Evidence
+from hapticd_studies.paper.starts import HANDS_N, NATIVE_N_PER_M, NOISES_M, WINDOW_HANDS_N, WINDOW_READINGS
 from hapticd_studies.paper.style import BLUE, GREEN, GREY, INK, ORANGE, OUTCOMES, PURPLE, RED, WIDTH_IN
+from hapticd_studies.paper.window import window_shares
 from hapticd_studies.style import figure as sheet
 
 _COLOURS = (GREEN, BLUE, ORANGE)
@@ -26,8 +27,9 @@ def native_limit(evidence: Evidence) -> Figure:
             spread = (np.linspace(-0.1, 0.1, spans_mm.shape[2]) if spans_mm.shape[2] > 1 else 0.0) + 0.25 * (hand - 1)
             label = f"{-newton:g} N" if row == 0 else ""
             axes.plot(at + spread, np.maximum(spans_mm[row, hand], 1e-3), ".", ms=3.0, color=colour, label=label)
-    axes.axhline(OSCILLATES_M * 1e3, color=RED, lw=0.9, ls="--")
-    axes.text(-0.45, OSCILLATES_M * 1.15e3, "oscillates", color=RED, fontsize=7.5)
+    still_mm = Criterion().still_m * 1e3
+    axes.axhline(still_mm, color=RED, lw=0.9, ls="--")
+    axes.text(-0.45, 1.15 * still_mm, "keeps moving", color=RED, fontsize=7.5)
     axes.axhline(0.01, color=GREY, lw=0.8, ls=":")
     axes.text(2.5, 0.0108, "one count", color=GREY, fontsize=7.5)
     axes.set_yscale("log")
@@ -62,10 +64,31 @@ def tdpa_map(evidence: Evidence) -> Figure:
     return figure
 
 
+def window(evidence: Evidence) -> Figure:
+    """Share that rests at 12 kN/m over hand and noise, without and with the window, in each reading."""
+    shares = window_shares(evidence).mean(axis=0)
+    figure, grid = sheet(WIDTH_IN, 3.8, 2, len(WINDOW_READINGS), sharex=True, sharey=True)
+    hands_n = -np.array(WINDOW_HANDS_N)
+    for column, reading in enumerate(WINDOW_READINGS):
+        for row, title in enumerate(("without", "window 2+2")):
+            axes = grid[row, column]
+            drawn = axes.pcolormesh(
+                _edges(hands_n), np.arange(len(NOISES_M) + 1), shares[column, :, row], vmin=0.0, vmax=1.0, cmap="YlGnBu"
+            )
+            axes.set_yticks(np.arange(len(NOISES_M)) + 0.5, [f"{noise * 1e6:g}" for noise in NOISES_M])
+            axes.set_title(f"{reading}\n{title}")
+            axes.grid(visible=False)
+        grid[1, column].set_xlabel("hand [N]")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("noise [µm]")
+    figure.colorbar(drawn, ax=grid, label="share at rest", pad=0.01, aspect=20)
+    return figure
+
+
 def damping_at_speed(evidence: Evidence) -> Figure:
     """The damping in force against the speed at which it acts: where TDPA goes wrong."""
     figure, ((axes,),) = sheet(WIDTH_IN, 2.9)
-    drawn = [("fig10", "TDPA as published", RED), ("fig10-bounded", "TDPA, bounded", PURPLE)]
+    drawn = [("fig10", "TDPA unbounded, exact", RED), ("fig10-bounded", "TDPA, bounded", PURPLE)]
     drawn += [(name, f"energy cycles, {name[-2:]} kN/m", colour) for name, colour in zip(HELD, _COLOURS, strict=True)]
     for name, label, colour in drawn:
         run = evidence.runs[name]
@@ -91,13 +114,14 @@ def damping_at_speed(evidence: Evidence) -> Figure:
 def long_contact(evidence: Evidence) -> Figure:
     """Energy of a long contact, with and without steps of the position."""
     figure, ((all_of_it, motion),) = sheet(WIDTH_IN, 2.8, 1, 2, width_ratios=(1.6, 1.0))
-    colours = dict(zip(HELD, _COLOURS, strict=True))
+    colours = {"fig9-12-off": GREY, **dict(zip(HELD, _COLOURS, strict=True))}
     for name, run in evidence.long.items():
         stiffness = f"{run.scenario.stiffness_n_per_m * 1e-3:g} kN/m"
         continuous = run.resolution_m == 0.0
         colour = PURPLE if continuous else colours[name]
         style = ":" if continuous and "18" in name else "--" if continuous else "-"
-        label = stiffness + (", continuous" if continuous else "")
+        off = ", 3.03 N" if name in OFF_COUNT else ""
+        label = stiffness + (", continuous" if continuous else off)
         all_of_it.plot(run.t_s[::50], run.energy_j[::50] * 1e3, color=colour, ls=style, label=label)
         last = run.t_s >= run.t_s[-1] - 0.2
         if not continuous:

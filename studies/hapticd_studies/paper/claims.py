@@ -13,6 +13,11 @@ from hapticd_studies.paper.recording import Recording, RunFigures
 from hapticd_studies.paper.starts import Shares
 
 HELD = ("fig9-12", "fig9-18", "fig9-20")
+OFF_COUNT = tuple(f"{name}-off" for name in HELD)
+"""The same under a hand that no whole number of counts balances."""
+
+SHOWN_S = 0.5
+"""What the paper's plots of its experiments show [s]."""
 
 
 @dataclass(frozen=True, slots=True)

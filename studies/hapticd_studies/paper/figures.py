@@ -9,12 +9,39 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hapticd_studies.paper.claims import HELD, Evidence
+from hapticd_studies.paper.claims import HELD, OFF_COUNT, SHOWN_S, Evidence
+from hapticd_studies.paper.experiments import SMOOTHED_SAMPLES
 from hapticd_studies.paper.recording import Array, Recording
 from hapticd_studies.paper.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, WIDTH_IN, limits, shade_wall
 from hapticd_studies.style import figure as sheet
 
 _MARK = {"marker": "v", "ls": "none", "ms": 4.0, "mec": "white", "mew": 0.4, "zorder": 5}
+
+
+def loop(evidence: Evidence) -> Figure:
+    """Fig. 1: the held force over the displacement of one press and release."""
+    run = evidence.runs["fig1"]
+    figure, grid = sheet(WIDTH_IN, 3.0, 1, 2, width_ratios=(1.6, 1.0))
+    for axes, close in zip(grid[0], (False, True), strict=True):
+        touched = np.flatnonzero(run.force_n > 0.0)
+        path = slice(int(touched[0]), int(touched[-1]) + 2)
+        depth_mm, force_n = -run.x_m[path] * 1e3, run.force_n[path]
+        turn = int(np.argmax(depth_mm))
+        for part, colour, label in (
+            (slice(0, turn + 1), GREEN, "press: stored"),
+            (slice(turn, None), RED, "release: given back"),
+        ):
+            # A force is held until the next sample: first the way, then the step.
+            axes.step(depth_mm[part], force_n[part], where="post", color=colour, label=label)
+        deepest = np.array([0.0, float(depth_mm.max())])
+        axes.plot(deepest, run.scenario.stiffness_n_per_m * deepest * 1e-3, color=GREY, lw=0.8, ls="--", label="spring")
+        axes.set_xlabel("depth [mm]")
+        if close:
+            axes.set_xlim(0.85 * deepest[1], 1.01 * deepest[1])
+            axes.set_ylim(0.85 * force_n.max(), 1.02 * force_n.max())
+    grid[0, 0].set_ylabel("force [N]")
+    grid[0, 0].legend(loc="upper left")
+    return figure
 
 
 def leak(evidence: Evidence) -> Figure:
@@ -134,9 +161,14 @@ def controlled(evidence: Evidence) -> Figure:
 
 
 def passivity_control(evidence: Evidence) -> Figure:
-    """Fig. 10: TDPA at 12 kN/m, as published and bounded."""
-    figure, grid = sheet(WIDTH_IN, 7.0, 4, 2, sharex=True)
-    for column, (name, title) in enumerate((("fig10", "as published"), ("fig10-bounded", "bounded"))):
+    """Fig. 10: TDPA at 12 kN/m: unbounded with either observer, and bounded."""
+    drawn = (
+        ("fig10", "unbounded, exact observer"),
+        ("fig10-printed", "unbounded, printed observer"),
+        ("fig10-bounded", "bounded"),
+    )
+    figure, grid = sheet(WIDTH_IN, 7.0, 4, 3, sharex=True)
+    for column, (name, title) in enumerate(drawn):
         run = evidence.runs[name]
         shown = run.t_s <= 2.0
         _position(grid[0, column], run, shown)
@@ -150,39 +182,53 @@ def passivity_control(evidence: Evidence) -> Figure:
         grid[3, column].set_xlabel("time [s]")
     for row in (0, 3):
         _same_height(grid[row])
-    shade_wall(grid[0, 1])
+    for axes in grid[0, 1:]:
+        shade_wall(axes)
     _outer_labels(grid)
     return figure
 
 
 def displayed_stiffness(evidence: Evidence) -> Figure:
-    """Fig. 11: force over depth, of the true and of the measured position."""
-    figure, grid = sheet(WIDTH_IN, 2.6, 1, 3, sharex=True, sharey=True)
-    for axes, name in zip(grid[0], HELD, strict=True):
+    """Fig. 11: force over true depth tick by tick, and smoothed as the paper's plot looks."""
+    figure, grid = sheet(WIDTH_IN, 4.4, 2, 3, sharex=True, sharey=True)
+    for axes, name in zip(grid.flat, (*HELD, *OFF_COUNT), strict=True):
         run = evidence.runs[name]
         stiffness = run.scenario.stiffness_n_per_m
-        shown = (run.t_s <= 0.5) & run.in_contact
-        for x_m, colour, label, width in (
-            (run.x_m, BLUE, "over true depth", 1.4),
-            (run.x_measured_m, ORANGE, "over measured depth", 0.7),
+        shown = run.until(SHOWN_S) & run.in_contact
+        for samples, colour, label, width in (
+            (1, ORANGE, "tick by tick", 0.5),
+            (SMOOTHED_SAMPLES, BLUE, f"over {SMOOTHED_SAMPLES} ms", 1.4),
         ):
-            # Force and depth oscillate about zero at first; the mean over 20 ms is what there is to display.
-            axes.plot(run.t_s[shown], _displayed(run, x_m)[shown] * 1e-3, color=colour, lw=width, label=label)
+            over = run.stiffness_n_per_m_over(samples)
+            axes.plot(run.t_s[shown], over[shown] * 1e-3, color=colour, lw=width, label=label)
         axes.axhline(stiffness * 1e-3, color=GREY, lw=0.9, ls="--", label="commanded")
-        axes.set_title(f"{stiffness * 1e-3:g} kN/m")
+        axes.set_title(f"{stiffness * 1e-3:g} kN/m, {-run.scenario.hand_n:g} N")
+    grid[0, 0].set_ylim(0.0, 35.0)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("displayed stiffness\n[kN/m]")
+    for axes in grid[1]:
         axes.set_xlabel("time [s]")
-    grid[0, 0].set_ylim(0.0, 25.0)
-    grid[0, 0].set_ylabel("displayed stiffness\n[kN/m]")
-    grid[0, 2].legend(loc="lower right")
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncol=3)
     return figure
 
 
-def _displayed(run: Recording, x_m: Array) -> Array:
-    window = np.ones(20)
-    force_n = np.convolve(np.where(run.in_contact, run.force_n, 0.0), window)[: len(x_m)]
-    depth_m = np.convolve(np.where(run.in_contact, -x_m, 0.0), window)[: len(x_m)]
-    displayed: Array = np.divide(force_n, depth_m, out=np.full(len(x_m), np.nan), where=depth_m > run.resolution_m)
-    return displayed
+def moving(evidence: Evidence) -> Figure:
+    """A moving hand: force and damping at 4 and 12 kN/m."""
+    names = ("moving-4", "moving-12", "moving-12-ring")
+    figure, grid = sheet(WIDTH_IN, 4.4, 2, 3, sharex=True, sharey="row")
+    for column, name in enumerate(names):
+        run = evidence.runs[name]
+        force, damping = grid[:, column]
+        force.plot(run.t_s, run.force_n, color=BLUE, lw=0.8, label="applied")
+        force.plot(run.t_s, run.spring_n(), color=ORANGE, lw=0.8, label="spring")
+        force.set_title(f"{run.scenario.stiffness_n_per_m * 1e-3:g} kN/m, {run.scenario.law}")
+        force.margins(x=0.0)
+        _damping(damping, run, np.ones(run.ticks, bool))
+        damping.set_xlabel("time [s]")
+    grid[0, 0].set_ylabel("force [N]")
+    grid[0, 0].legend(loc="upper left")
+    _outer_labels(grid)
+    return figure
 
 
 def _position(axes: Axes, run: Recording, shown: Array, colour: str = BLUE, label: str = "") -> None:

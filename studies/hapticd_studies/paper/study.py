@@ -21,7 +21,7 @@ from hapticd_studies.paper.runs import Runs
 from hapticd_studies.paper.scenarios import SCENARIOS
 from hapticd_studies.style import png
 
-LONG_RUNS = (*HELD, "fig9-18-continuous", "fig9-20-continuous")
+LONG_RUNS = ("fig9-12-off", *HELD, "fig9-18-continuous", "fig9-20-continuous")
 """Watched for a bound on what they generate."""
 
 Progress = Callable[[str, float], None]
