@@ -26,6 +26,8 @@ from hapticd_studies.paper.scenarios import SCENARIOS
 from tests.studies.paper_evidence import evidence as gathered
 from tests.studies.paper_evidence import silent
 
+PAGE = Path(__file__).parents[2] / "docs" / "paper.md"
+
 
 @pytest.fixture(scope="module")
 def evidence() -> Evidence:
@@ -177,6 +179,28 @@ def test_claims_are_written_for_programs(evidence: Evidence, folder: Path) -> No
     table = json.loads((folder / "readings.json").read_text())
     assert len(table["scenarios"]) == 28
     assert all(len(reading["outcome"]) == 28 for reading in table["readings"])
+
+
+def test_the_page_of_the_paper_has_the_claims_and_verdicts_that_come_out(evidence: Evidence) -> None:
+    """Figures differ with the number of starts; which claims there are, what they say and whether they hold do not."""
+    said = re.findall(
+        r"^\| `([a-z0-9-]+)` \| (.*?) \| (.*?) \| .* \| (yes|\*\*no\*\*) \|$", block("claims"), re.MULTILINE
+    )
+    ours = [(one.key, one.source, one.claim, "yes" if one.holds else "**no**") for one in judge(evidence)]
+    assert said == ours
+
+
+def test_the_page_of_the_paper_has_the_readings_that_come_out(evidence: Evidence) -> None:
+    said = dict(re.findall(r"^\| (.*?) \| (\d+) \|$", block("readings"), re.MULTILINE))
+    table = evidence.table
+    passed = {reading.name: str(count) for reading, count in zip(table.readings, table.passed, strict=True)}
+    assert {name: said.get(name, "28") for name in passed} == passed
+
+
+def block(name: str) -> str:
+    """What docs/paper.md has between these marks."""
+    (text,) = re.findall(f"<!-- begin {name} -->\n(.*?)<!-- end {name} -->", PAGE.read_text(), re.DOTALL)
+    return str(text)
 
 
 def test_a_written_scenario_gives_the_run_of_the_report(evidence: Evidence, folder: Path) -> None:

@@ -12,7 +12,7 @@ from rich.table import Table
 from hapticd.progress import progress_bar
 from hapticd_studies.grid.output import require_extra, require_folder
 
-FILES = ("report.html", "claims.json", "readings.json")
+FILES = ("report.html", "claims.json", "readings.json", "tables.md")
 
 
 def command(

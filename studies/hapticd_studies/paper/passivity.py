@@ -26,8 +26,7 @@ def claims(evidence: Evidence) -> list[Claim]:
             "unbounded, exact observer",
             "fig10",
             evidence.shares.tdpa,
-            f"It depends on hand force and start: over the whole map {percent(float(everywhere.settled.mean()))} rest. "
-            "One experiment, as in the paper, decides little.",
+            f"Over the whole map of hand forces and starts {percent(float(everywhere.settled.mean()))} rest.",
         ),
         _unstable(
             evidence,

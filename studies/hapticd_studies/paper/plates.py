@@ -115,10 +115,10 @@ PLATES = (
     ),
     Plate(
         "map",
-        "What TDPA does at 12 kN/m depends on hand and start",
+        "TDPA and energy cycles at 12 kN/m over hand and start",
         "The omega.7 model at 12 kN/m, a cell a run of 6 s. Top: how far it still moves. Bottom: the verdict.",
-        "Unbounded it moves by millimetres at some hand forces and starts, and rests at others, sometimes out of "
-        "place: a single experiment decides little. Bounded TDPA and energy cycles hold the wall everywhere here.",
+        "Unbounded it rests hardly anywhere; how far it moves depends on hand force and start. "
+        "Bounded TDPA and energy cycles hold the wall everywhere here.",
         charts.tdpa_map,
     ),
     Plate(

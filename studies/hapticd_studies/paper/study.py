@@ -19,6 +19,7 @@ from hapticd_studies.paper.recording import record
 from hapticd_studies.paper.report import report
 from hapticd_studies.paper.runs import Runs
 from hapticd_studies.paper.scenarios import SCENARIOS
+from hapticd_studies.paper.tables import tables
 from hapticd_studies.style import png
 
 LONG_RUNS = ("fig9-12-off", *HELD, "fig9-18-continuous", "fig9-20-continuous")
@@ -90,6 +91,7 @@ def publish(evidence: Evidence, folder: Path, dots_per_inch: int, command: str, 
         write(folder / "scenarios" / f"{name}.toml", scenario.text().encode())
     write(folder / "claims.json", as_json(_results(evidence, claims, command, made)))
     write(folder / "readings.json", as_json(evidence.table.declared()))
+    write(folder / "tables.md", tables(claims, evidence.table).encode())
     write(folder / "report.html", report(evidence, claims, pictures, command, made).encode())
     return claims
 
