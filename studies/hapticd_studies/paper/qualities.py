@@ -73,7 +73,9 @@ def _low_frequency(evidence: Evidence) -> Claim:
 
     names = (*HELD, *OFF_COUNT)
     ours = {name: shown(name) for name in names}
-    rest = {name: high_share(evidence.runs[name].damping_force_n()[-500:], 1e-3) for name in names}
+    rest = {
+        name: high_share(evidence.runs[name].damping_force_n()[-500:], evidence.runs[name].period_s) for name in names
+    }
     return Claim(
         "low-frequency",
         "Section I",
