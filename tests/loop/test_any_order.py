@@ -176,6 +176,8 @@ class AnyOrder(RuleBasedStateMachine):
                 self.latched = False
             if event.code == EventCode.ARMED:
                 assert self.may_be_armed, "it armed, and was told not to"
+                if self.asked is not None:
+                    self.asked["armed"] = True
         if self.tick.fault:  # told with the next tick
             self.fault()
         if self.asked is not None and self.answered:
@@ -195,7 +197,7 @@ class AnyOrder(RuleBasedStateMachine):
         do, done = asked["do"], verdict == ""
         if do == "arm":
             if done:
-                assert not asked["withdrawn"], "disarming was asked for after it"
+                assert not asked["withdrawn"] or asked["armed"], "disarming was asked for before it was done"
                 assert not asked["latched"], "a fault waits to be cleared"
             elif asked["withdrawn"]:
                 assert self.latched or verdict == DISARMED_SINCE
@@ -236,7 +238,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     def ask(self, request: dict[str, Any], **known: Any) -> None:
         self.shared.post(dict(request))
-        self.asked = {**request, "withdrawn": False, "latched": self.latched, **known}
+        self.asked = {**request, "withdrawn": False, "armed": False, "latched": self.latched, **known}
 
     @precondition(lambda self: self.asked is None)
     @rule()
