@@ -94,7 +94,7 @@ class Timing:
         deadline_ns: when it was due [ns of CLOCK_MONOTONIC].
         late_us: how late it started [us].
         busy_us: how long its body took [us].
-        dt_s: time since the tick before, on the device's clock where it has one [s].
+        dt_s: time since the sample before, on the device's clock where it has one; 0 where it had nothing new [s].
         invalid: a value was not finite and stands here as 0.
     """
 
