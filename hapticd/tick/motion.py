@@ -175,7 +175,7 @@ class Motion:
 
     @property
     def frozen(self) -> bool:
-        """Whether the device has had nothing new for so long that it is not to be relied on."""
+        """Whether the device has had nothing new for too long to be relied on."""
         return self.repeated >= LEAST_REPEATS and self.repeated_s >= self._frozen_s
 
     def watch_speed(self, watch: bool) -> None:

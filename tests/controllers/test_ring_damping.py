@@ -125,7 +125,7 @@ def test_every_simulation_of_the_paper_converges(start: Device, active: str) -> 
 
 
 def test_one_sample_of_delay_grows_the_base() -> None:
-    """Three leaks are due then; the swings that do not die away tell it, and nobody else does."""
+    """Three leaks are due then; only the swings that do not die away tell it."""
     late = Device(stiffness_n_per_m=15e3, resolution_m=2e-6, delay_samples=1, hand_n=-3.3)
     rig = rig_on(late)
     assert rig.run(6.0).held

@@ -39,7 +39,7 @@ def test_without_a_damper_it_rings_for_ever() -> None:
 
 
 def test_without_a_damper_the_surface_is_where_the_device_was_first_seen_inside() -> None:
-    """A jump to the surface would put k x^2 / 2 into the spring, and nobody has paid for it."""
+    """A jump to the surface would put k x^2 / 2 into the spring, which was not paid for."""
     rig = Rig(set_position, Device(x_m=0.003), Params(damping_n_s_per_m=0.0))
     while not rig.tick.in_contact:
         rig.run(1e-3)

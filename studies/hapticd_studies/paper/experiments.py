@@ -10,7 +10,7 @@ from hapticd_studies.paper.recording import Array, Recording
 from hapticd_studies.paper.starts import BEYOND_N_PER_M, HANDS_N, HELD_N_PER_M, NATIVE_N_PER_M
 
 SMOOTHED_SAMPLES = 20
-"""Over so many samples the displayed stiffness is smoothed."""
+"""Samples over which the displayed stiffness is smoothed."""
 
 _STATED_N_PER_M = 8e3
 """What the paper says that the device alone renders [N/m]."""

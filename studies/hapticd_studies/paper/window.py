@@ -18,7 +18,7 @@ from hapticd_studies.paper.starts import (
 )
 
 _STABLE = 0.95
-"""Of all hands, starts and noises so many must rest for a reading to be called stable."""
+"""Share of all hands, starts and noises that must rest for a reading to be called stable."""
 
 _COUNT_N = WINDOW_N_PER_M * 1e-5
 """Force of one count of the position on that wall [N]."""
