@@ -81,9 +81,16 @@ def test_a_skipped_test_is_a_failure_in_ci_only(tmp_path: Path, ci: str, status:
     assert done.stdout.count("skipped in CI") >= 2 * status
 
 
-def test_the_wheel_holds_five_packages_and_nothing_called_drivers(installed: Path) -> None:
+def test_the_wheel_holds_six_packages_and_nothing_called_drivers(installed: Path) -> None:
     packages = {path.name for path in installed.iterdir() if path.suffix != ".dist-info"}
-    assert packages == {"hapticd", "hapticd_bench", "hapticd_controllers", "hapticd_drivers", "hapticd_studies"}
+    assert packages == {
+        "hapticd",
+        "hapticd_bench",
+        "hapticd_controllers",
+        "hapticd_drivers",
+        "hapticd_studies",
+        "hapticd_views",
+    }
 
 
 def test_the_wheel_holds_every_shipped_configuration(installed: Path) -> None:

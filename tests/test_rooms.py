@@ -21,6 +21,7 @@ PACKAGES = {
     "hapticd_controllers": ROOT / "controllers" / "hapticd_controllers",
     "hapticd_studies": ROOT / "studies" / "hapticd_studies",
     "hapticd_bench": ROOT / "benchmarks" / "hapticd_bench",
+    "hapticd_views": ROOT / "views" / "hapticd_views",
 }
 SOURCES = {name: sorted(folder.rglob("*.py")) for name, folder in PACKAGES.items()}
 
