@@ -21,6 +21,7 @@ from pydantic import Field
 from hapticd.device import MOST_METRICS, DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
 from hapticd.errors import DriverError, DriverStateError
 from hapticd.settings import Table
+from hapticd.trace import DriverTrace
 
 __all__ = [
     "DeviceInfo",
@@ -71,6 +72,7 @@ class Driver(ABC, Generic[OptionsT]):
         ABSENT: what to do when `find` finds nothing, in a few words.
         metrics: one number for each of `METRICS`, in their order; a driver writes them whenever it likes, from any of
             its threads, which costs a tick no more than storing a number.
+        trace: what was last said between driver and device, where a driver keeps that; it is in every fault record.
     """
 
     Options: ClassVar[type[DriverOptions]] = DriverOptions
@@ -81,6 +83,7 @@ class Driver(ABC, Generic[OptionsT]):
         self.options = options
         self.period_s = period_s
         self.metrics = memoryview(bytearray(8 * MOST_METRICS)).cast("d")
+        self.trace = DriverTrace()
         self.state = DriverState.CLOSED
         self._info: DeviceInfo | None = None
         self._limit_squared = 0.0

@@ -31,7 +31,7 @@ MOST_LINES_OF_A_MODULE = 400
 LARGEST_ROOM = 0.15
 
 LAW_MAY_IMPORT = {"hapticd.law", "hapticd.errors", "hapticd.tick.energy"}
-DRIVER_MAY_IMPORT = {"hapticd.driver", "hapticd.device", "hapticd.errors", "hapticd.settings"}
+DRIVER_MAY_IMPORT = {"hapticd.driver", "hapticd.device", "hapticd.errors", "hapticd.settings", "hapticd.trace"}
 SIMULATED_DRIVER_MAY_IMPORT = DRIVER_MAY_IMPORT | {"hapticd.simulation.driver", "hapticd.simulation.options"}
 
 

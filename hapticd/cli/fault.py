@@ -51,7 +51,10 @@ def list_records(instance: Instance = DEFAULT_INSTANCE, directory: Directory = N
         except HapticdError as error:  # one of them hides no other
             damaged.append(str(error))
     if as_json:
-        typer.echo(json.dumps([{"name": path.stem, "path": str(path), **header} for path, header in headers]))
+        listed = [{"name": path.stem, "path": str(path), **header} for path, header in headers]
+        for entry in listed:
+            entry.pop("trace", None)  # up to thousands of lines each; `show` has them
+        typer.echo(json.dumps(listed))
     elif not headers and not damaged:
         typer.echo("no fault records in " + " or ".join(map(str, _places(instance, directory))), err=True)
     for path, header in [] if as_json else headers:
@@ -67,6 +70,9 @@ def show(
     instance: Instance = DEFAULT_INSTANCE,
     directory: Directory = None,
     window: Annotated[float, typer.Option("--window", min=0.1, max=10.0, help="Time in the picture [s].")] = 0.5,
+    trace: Annotated[
+        bool, typer.Option("--trace", help="Print what driver and device had said to each other last.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Show what happened around a fault: the event, some figures, and a picture of position and force.
@@ -80,6 +86,10 @@ def show(
         return
     for line in _lines(record, summary):
         typer.echo(line)
+    if trace:
+        for line in record.trace:
+            typer.echo(_since(line, record.fault_ns))
+        return
     console = Console(highlight=False)
     for picture in _picture(record, window, console.width):
         picture.rstrip()
@@ -157,8 +167,14 @@ def _lines(record: FaultRecord, summary: FaultSummary) -> list[str]:
         f"config   {header['config']['file']} ({header['config']['sha256'][:12]}), law {header['law']}",
         f"record   {summary.ticks} ticks, {summary.before_s:.2f} s before and {summary.after_s:.2f} s after, "
         f"{summary.skipped} deadlines skipped",
+        f"trace    {len(record.trace)} entries" + (", shown by --trace" if record.trace else ""),
         f"force    {summary.force_before_n:.3g} N before, at most {summary.peak_force_n:.3g} N after, {gone}",
     ]
+
+
+def _since(line: str, fault_ns: int) -> str:
+    at_ns, said = line.split(" ", 1)
+    return f"{(int(at_ns) - fault_ns) * 1e-6:+12.3f} ms  {said}"
 
 
 def _picture(record: FaultRecord, window_s: float, width: int) -> list[Text]:

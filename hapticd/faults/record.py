@@ -46,6 +46,11 @@ class FaultRecord:
     ticks: list[TickRecord]
 
     @property
+    def trace(self) -> list[str]:
+        """What driver and device had said to each other last, each entry with its time on CLOCK_MONOTONIC [ns]."""
+        return list(self.header.get("trace", ()))  # records of version 0.1 have none
+
+    @property
     def fault_ns(self) -> int:
         """Time of the fault on CLOCK_MONOTONIC [ns]."""
         return int(self.header["event"]["deadline_ns"])

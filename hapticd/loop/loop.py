@@ -73,6 +73,7 @@ class ControlLoop:
         self._stopping = False
         self._stalled = False
         driver.share_metrics(shared.metrics)
+        driver.trace.share(shared.trace)
 
     def run(self) -> None:
         """Tick until a stop is requested; whatever happens, the device is left without force.

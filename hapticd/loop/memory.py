@@ -1,6 +1,6 @@
 """The memory that the loop and the supervisor share.
 
-    words | the driver's metrics | answer | request | events | tick records
+    words | the driver's metrics | answer | request | events | the driver's trace | tick records
 
 One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
 copied a slot: on x86 stores become visible in order, so what was not overwritten by then is whole. Other machines
@@ -22,6 +22,7 @@ from hapticd.device import MOST_METRICS
 from hapticd.errors import HapticdError
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.record import RecordLayout, TickRecord
+from hapticd.trace import AREA_BYTES
 
 HISTORY_S = 8.0
 """How much of the past the ring of records holds [s]."""
@@ -57,7 +58,8 @@ _REQUEST_SIZE = 1 << 18
 _EVENTS = _REQUEST + _REQUEST_SIZE
 _EVENT_SIZE = 1024
 _EVENT_SLOTS = 256
-_RECORDS = _EVENTS + _EVENT_SIZE * _EVENT_SLOTS
+_TRACE = _EVENTS + _EVENT_SIZE * _EVENT_SLOTS
+_RECORDS = _TRACE + AREA_BYTES
 
 
 class SharedMemory:
@@ -72,6 +74,7 @@ class SharedMemory:
         view: all of it.
         words: the 64-bit words at the start.
         metrics: the driver's metrics; it writes each of them as a whole.
+        trace: the driver's trace, as `hapticd.trace` keeps it.
         record_area: where the records lie.
         descriptor: file descriptor to hand to the other process.
 
@@ -93,12 +96,14 @@ class SharedMemory:
         self.view = memoryview(self._map)
         self.words = self.view[:_METRICS].cast("q")
         self.metrics = self.view[_METRICS : _METRICS + 8 * MOST_METRICS].cast("d")
+        self.trace = self.view[_TRACE:_RECORDS]
         self.record_area = self.view[_RECORDS:]
 
     def close(self) -> None:
         """Unmap the memory."""
         self.words.release()
         self.metrics.release()
+        self.trace.release()
         self.record_area.release()
         self.view.release()
         self._map.close()

@@ -18,6 +18,7 @@ from hapticd.faults.record import encode
 from hapticd.faults.store import FaultStore
 from hapticd.loop.memory import RECORDS, SharedMemory
 from hapticd.tick.event import LoopEvent
+from hapticd.trace import lines
 
 BEFORE_S = 5.0
 AFTER_S = 1.0
@@ -126,6 +127,7 @@ class _Job(threading.Thread):
         self._epoch_s = epoch_s
         self._header = header
         self._shared = SharedMemory(shared.layout, rate_hz, os.dup(shared.descriptor))
+        self._trace = bytes(shared.trace)  # now: a short one holds nothing of the fault a second later
         at = _number(self._shared, event.seq)
         self._first = max(0, at - round(BEFORE_S * rate_hz))
         self._end = at + round(AFTER_S * rate_hz) + 1
@@ -140,7 +142,7 @@ class _Job(threading.Thread):
     def run(self) -> None:
         """Copy, compress, write."""
         try:
-            content = encode(self._header, self._shared.layout, self._rows())
+            content = encode(self._header | {"trace": lines(self._trace)}, self._shared.layout, self._rows())
             self._store.write(self._epoch_s, self._event.code, content, self.keep)
         except OSError as error:
             self.problem = f"fault record not written: {error.filename or self._store.directory}: {error.strerror}"

@@ -25,6 +25,7 @@ from hapticd.paths import fault_directories, fault_directory
 from hapticd.supervisor.fault_recorder import FaultRecorder
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.record import RecordLayout
+from hapticd.trace import DriverTrace
 from tests.daemon.running import wait_until
 
 RATE_HZ = 1000.0
@@ -174,6 +175,23 @@ def test_a_record_holds_five_seconds_before_and_one_after_or_what_there_is(
     (path,) = FaultStore(tmp_path).paths()
     assert [tick.seq for tick in read(path).ticks] == list(held)
     assert recorder.written == 1
+
+
+def test_a_record_holds_what_driver_and_device_said_before_the_fault_and_not_what_came_after(tmp_path: Path) -> None:
+    shared = SharedMemory(LAYOUT, RATE_HZ)
+    extend(shared, 100, 0)
+    trace = DriverTrace(3)
+    trace.share(shared.trace)
+    for said in ("> 01", "< 02", "> 03", "it is hot"):
+        trace.keep(said)
+    recorder = FaultRecorder(tmp_path)
+    recorder.begin(LoopEvent(EventCode.DEVICE_FAULT, "it is hot", 99, 0), 1e9, shared, RATE_HZ, header())
+    for _ in range(3):
+        trace.keep("closed")
+    shared.close()
+    assert recorder.close(5, 10.0) == ""
+    (path,) = FaultStore(tmp_path).paths()
+    assert [line.split(" ", 1)[1] for line in read(path).trace] == ["< 02", "> 03", "it is hot"]
 
 
 def test_a_record_waits_for_the_ticks_after_the_fault(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from hapticd.errors import HapticdError
 from hapticd.loop.memory import ANSWERED, DISARM, EVENTS, RECORDS, REQUESTS, EventReader, RecordReader, SharedMemory
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.record import RecordLayout, TickRecord
+from hapticd.trace import DriverTrace, lines
 from hapticd_drivers.loopback import Loopback
 
 LAYOUT = RecordLayout(3, False, MAX_WALLS)
@@ -276,6 +277,24 @@ def test_what_a_driver_counts_is_seen_on_the_other_side_from_the_first_on(shared
     other.post({"do": "arm"})
     other.answer("no")
     assert list(shared.metrics[:3]) == [3.0, 812.5, 0.0]
+    other.close()
+
+
+def test_a_trace_goes_on_where_another_process_reads_it(shared: SharedMemory) -> None:
+    driver = Loopback(Loopback.Options(), 1e-3)
+    driver.trace = DriverTrace(4)
+    for number in range(3):
+        driver.trace.keep("before", number)
+    driver.trace.share(shared.trace)
+    driver.trace.keep("after")
+    other = SharedMemory(LAYOUT, RATE_HZ, os.dup(shared.descriptor))
+    write(other, 900)
+    other.write_event(event(5, "x" * 600))
+    assert [said.split(" ", 1)[1] for said in lines(other.trace)] == ["before 0", "before 1", "before 2", "after"]
+    driver.trace.keep("newest")
+    assert driver.trace.lines() == lines(other.trace)
+    assert driver.trace.lines()[-1].endswith(" newest")
+    assert len(driver.trace.lines()) == 4
     other.close()
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from hapticd.device import DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import ConfigError, DeviceFaultError, DriverStateError
+from hapticd.trace import DriverTrace
 from hapticd_drivers.forcedimension import diagnosis, discovery, presence, settings
 from hapticd_drivers.forcedimension.failures import NOT_AVAILABLE, TIMEOUT, cause_of
 from hapticd_drivers.forcedimension.models import MODELS, NOMINAL_RATE_HZ, Model, unknown
@@ -26,7 +27,6 @@ from hapticd_drivers.forcedimension.prototypes import (
     STATUS_WORDS,
 )
 from hapticd_drivers.forcedimension.sdk import Sdk
-from hapticd_drivers.trace import Trace
 
 SETTLE_S = 0.1
 """How long after being enabled the device may still say that forces are off: known programs wait as long [s]."""
@@ -51,7 +51,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
 
     def __init__(self, options: ForceDimensionOptions, period_s: float) -> None:
         super().__init__(options, period_s)
-        self._trace = Trace(options.trace)
+        self.trace = DriverTrace(options.trace)
         self._sdk: Sdk | None = None
         self._id = -1
         self._left = False
@@ -93,13 +93,9 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         """
         return diagnosis.diagnose(options or ForceDimensionOptions())
 
-    def trace_lines(self) -> list[str]:
-        """The last calls of the SDK, oldest first; none unless `device.options.trace` says how many."""
-        return self._trace.lines()
-
     def _open(self) -> DeviceInfo:
         options = self.options
-        self._sdk = sdk = Sdk(options.library, self._trace if options.trace else None)
+        self._sdk = sdk = Sdk(options.library, self.trace if options.trace else None)
         found = discovery.open_device(sdk, options.serial, unknown=options.max_force_n is not None)
         self._id = device = found.id
         model = MODELS.get(found.type) or _asked(sdk, found, options)

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from hapticd.errors import DriverError, PluginError
+from hapticd.trace import DriverTrace
 from hapticd_drivers.forcedimension.failures import failure
 from hapticd_drivers.forcedimension.prototypes import OPTIONAL, PROTOTYPES
-from hapticd_drivers.trace import Trace
 
 NAME = "libdrd.so.3"
 OLDEST = (3, 14)
@@ -45,7 +45,7 @@ class Sdk:
         PluginError: it is not there, cannot be loaded, is too old or lacks a function.
     """
 
-    def __init__(self, library: str | None = None, trace: Trace | None = None) -> None:
+    def __init__(self, library: str | None = None, trace: DriverTrace | None = None) -> None:
         self.path, handle = _load(library)
         for name, (result, *arguments) in PROTOTYPES.items():
             function = _function(handle, name)
@@ -167,7 +167,7 @@ def _load(library: str | None) -> tuple[str, ctypes.CDLL]:
     )
 
 
-def _traced(name: str, function: Any, trace: Trace) -> Callable[..., Any]:
+def _traced(name: str, function: Any, trace: DriverTrace) -> Callable[..., Any]:
     """A function of the SDK whose calls are kept: arguments as they are afterwards, with what was written to them."""
 
     def call(*arguments: Any) -> Any:

@@ -18,6 +18,7 @@ from hapticd.errors import (
     DriverError,
     DriverStateError,
 )
+from hapticd.trace import DriverTrace
 from hapticd_drivers.rig import messages, motion
 from hapticd_drivers.rig.conversation import Conversation
 from hapticd_drivers.rig.link import Link
@@ -27,7 +28,6 @@ from hapticd_drivers.rig.metrics import METRICS, ROUND_TRIP_US, TICKS_WITHOUT_ST
 from hapticd_drivers.rig.mover import RigMover
 from hapticd_drivers.rig.options import AxisOptions, RigOptions
 from hapticd_drivers.rig.traced_link import TracedLink
-from hapticd_drivers.trace import Trace
 
 PATIENCE = 0.25
 """Share of the period for which a tick waits for a state that is late."""
@@ -66,7 +66,7 @@ class RigDriver(Driver[RigOptionsT]):
     def __init__(self, options: RigOptionsT, period_s: float) -> None:
         super().__init__(options, period_s)
         self._talk: Conversation | None = None
-        self._trace = Trace(options.trace)
+        self.trace = DriverTrace(options.trace)
         self._maps: list[AxisMap] = []
         self._sample = Sample(1)
         self._state_wait_s = PATIENCE * period_s
@@ -81,10 +81,6 @@ class RigDriver(Driver[RigOptionsT]):
         self._sign_checked = options.sign_checked
         self._lock = threading.Lock()  # a calibration talks to the rig beside the loop
         self._knows_home = False
-
-    def trace_lines(self) -> list[str]:
-        """The last messages both ways, oldest first; none unless `device.options.trace` says how many."""
-        return self._trace.lines()
 
     @abstractmethod
     def _connect(self) -> Link:
@@ -104,7 +100,7 @@ class RigDriver(Driver[RigOptionsT]):
     def _open(self) -> DeviceInfo:
         link = self._connect()
         if self.options.trace:
-            link = TracedLink(link, self._trace)
+            link = TracedLink(link, self.trace)
         self._talk = talk = Conversation(link, self, self.NAME)
         identity = talk.greet()
         if not 1 <= identity.axes <= messages.MOST_AXES:

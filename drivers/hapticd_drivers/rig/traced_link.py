@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from hapticd.errors import DriverError
+from hapticd.trace import DriverTrace
 from hapticd_drivers.rig.link import Link
-from hapticd_drivers.trace import Trace
 
 
 class TracedLink:
@@ -18,7 +18,7 @@ class TracedLink:
         trace: where messages are kept.
     """
 
-    def __init__(self, link: Link, trace: Trace) -> None:
+    def __init__(self, link: Link, trace: DriverTrace) -> None:
         self.where = link.where
         self.notes = link.notes
         self._link = link

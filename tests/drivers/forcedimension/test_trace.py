@@ -17,11 +17,11 @@ def test_each_call_is_kept_with_what_it_was_given_and_what_it_wrote(bench: Bench
     driver = bench.driver(trace=1000)
     driver.open()
     bench.clear_log()
-    before = len(driver.trace_lines())
+    before = len(driver.trace.lines())
     driver.enable()
     driver.read()
     driver.write([0.0, 0.0, 1.5])
-    lines = driver.trace_lines()
+    lines = driver.trace.lines()
     names = [without_time(line).split()[0].removesuffix("AndOrientationFrame") for line in lines[before:]]
     assert [name for name in names if not name.startswith("dhdErrorGet")] == bench.log()  # which knows no errors
     assert "dhdGetSerialNumber 1234 0 = 0" in map(without_time, lines)
@@ -43,18 +43,18 @@ def test_it_is_of_bounded_size_and_outlives_a_device_that_is_lost(bench: Bench) 
     bench.set(present=0)
     with pytest.raises(DeviceDisconnectedError):
         driver.read()
-    lines = [without_time(line) for line in driver.trace_lines()]
+    lines = [without_time(line) for line in driver.trace.lines()]
     assert len(lines) == 7
     assert lines[-2:] == ["dhdErrorGetLast = 2", "dhdErrorGetLastStr = b'communication error'"]
     assert lines[-3].endswith("= -1")
     driver.close()
-    assert len(driver.trace_lines()) == 7
+    assert len(driver.trace.lines()) == 7
 
 
 def test_without_the_option_nothing_is_kept_and_no_call_costs_more(bench: Bench) -> None:
     driver = bench.driver()
     driver.open()
     driver.read()
-    assert driver.trace_lines() == []
+    assert driver.trace.lines() == []
     assert driver._set_force.__class__.__name__ == "_FuncPtr"  # the SDK's function itself
     driver.close()

@@ -15,7 +15,9 @@ import msgpack
 import pytest
 import zmq
 
+from hapticd.faults.record import read, read_header
 from hapticd.tick.event import EventCode
+from hapticd_drivers.rig import messages
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.firmware.board import Board, Built
 
@@ -39,6 +41,7 @@ def config(board: Board, homing: str) -> str:
         driver = "serial-rig"
         [device.options]
         port = "{board.port}"
+        trace = 200
         calibration_speed_m_per_s = 0.2
         [[device.options.axes]]
         homing = "{homing}"
@@ -209,7 +212,8 @@ def test_when_the_daemon_is_stopped_the_rig_lets_go_and_takes_no_force_until_it_
         until(subscriber, "watchdog heard no command for 20 ms")
         subscriber.until("hapticd/event", code=EventCode.DEVICE_FOUND)
         assert lab.board.state().motor_n == 0.0
-        assert "hapticd clear" in lab.ask("arm")
+        # Held up once more, it has been lost again: what it then says is that there is no device.
+        wait_until(lambda: "hapticd clear" in lab.ask("arm"), "the rig to be there and to be cleared first")
         assert lab.ask("clear") == ""
         assert "pushes the right way" in lab.ask("arm")
         lab.press()
@@ -221,6 +225,11 @@ def test_a_killed_loop_leaves_no_force(lab: Lab) -> None:
     assert lab.daemon.wait_exit() == 1
     assert lab.board.state().motor_n == 0.0
     assert "the device is without force" in lab.daemon.output()
+    (record,) = (path for path in lab.daemon.directory.rglob("*.fault") if "CONTROL_LOST" in str(read_header(path)))
+    said = [line.split(" ", 2)[1:] for line in read(record).trace]
+    assert len(said) == 200
+    assert {way for way, _ in said} == {">", "<"}
+    assert any(bytes.fromhex(message)[1] == messages.FORCE for way, message in said if way == ">")
 
 
 @on_a_board(HELD_M)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import pytest
 
 from hapticd.errors import DriverError
+from hapticd.trace import DriverTrace
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.messages import State, decode
 from hapticd_drivers.rig.serial_rig import SerialRig, SerialRigOptions
 from hapticd_drivers.rig.traced_link import TracedLink
-from hapticd_drivers.trace import Trace
 from tests.drivers.rig.device import Rig
 
 
 def parts(driver: SerialRig) -> list[tuple[str, str]]:
-    return [(way, said) for _, way, said in (line.split(" ", 2) for line in driver.trace_lines())]
+    return [(way, said) for _, way, said in (line.split(" ", 2) for line in driver.trace.lines())]
 
 
 def make(rig: Rig, trace: int) -> SerialRig:
@@ -24,7 +24,7 @@ def make(rig: Rig, trace: int) -> SerialRig:
 
 
 def test_every_message_is_kept_as_it_went_and_came(rig: Rig) -> None:
-    driver = make(rig, 10_000)
+    driver = make(rig, 4096)
     driver.open()
     driver.enable()
     driver.write([1.25])
@@ -46,14 +46,14 @@ def test_it_is_of_bounded_size_and_stays_after_the_end(rig: Rig) -> None:
     for _ in range(20):
         driver.read()
     driver.close()
-    assert len(driver.trace_lines()) == 5
+    assert len(driver.trace.lines()) == 5
 
 
 def test_without_the_option_nothing_is_kept_and_no_message_costs_more(rig: Rig) -> None:
     driver = make(rig, 0)
     driver.open()
     driver.read()
-    assert driver.trace_lines() == []
+    assert driver.trace.lines() == []
     assert not isinstance(driver._opened().link, TracedLink)
     driver.close()
 
@@ -83,7 +83,7 @@ class Worn:
 
 
 def test_what_the_link_could_not_carry_is_kept_as_well() -> None:
-    trace = Trace(100)
+    trace = DriverTrace(100)
     link = TracedLink(Worn(), trace)
     assert (link.where, link.notes) == ("worn", ("old",))
     for use in (lambda: link.send(b"\1\2"), link.receive):
