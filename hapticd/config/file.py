@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 from hapticd.errors import ConfigError
+from hapticd.replacing import obstacle, put
 
 _LARGEST = 1 << 20
 
@@ -61,6 +62,9 @@ def replace(path: Path, text: str) -> None:
     try:
         if not os.access(target, os.W_OK):
             raise PermissionError
+        reason = obstacle(target)
+        if reason:
+            raise ConfigError(f"{path}: {reason}")
         descriptor, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         try:
             with os.fdopen(descriptor, "wb") as file:
@@ -71,7 +75,7 @@ def replace(path: Path, text: str) -> None:
                 shutil.copystat(target, name)
                 os.utime(name)
                 os.fsync(descriptor)
-            Path(name).replace(target)
+            put(Path(name), target)
         except BaseException:
             with contextlib.suppress(OSError):
                 Path(name).unlink()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hapticd.errors import HapticdError
 from hapticd.faults.record import SUFFIX
+from hapticd.replacing import put
 
 _UNFINISHED = ".part"
 
@@ -59,7 +60,7 @@ class FaultStore:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-            unfinished.rename(path)
+            put(unfinished, path)
         except BaseException:
             with contextlib.suppress(OSError):
                 unfinished.unlink()

@@ -25,6 +25,7 @@ import zmq
 from zmq.utils import z85
 
 from hapticd.errors import ConfigError, HapticdError
+from hapticd.replacing import put
 
 _LARGEST_FILE = 1 << 14
 _ENTRY = re.compile(r"\s*([a-z-]+)\s*=\s*[\"']?(.*?)[\"']?\s*")
@@ -133,7 +134,7 @@ def written(path: Path, key: Key, *, mode: int = 0o600, group: int = -1, replace
         yield
         with _told(path):
             if replace:
-                Path(unfinished).rename(path)
+                put(Path(unfinished), path)
             else:
                 path.hardlink_to(unfinished)  # unlike a rename, refuses to take the place of another
     finally:

@@ -14,6 +14,7 @@ from typing import IO, Any
 
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.offline.run import Row
+from hapticd.replacing import obstacle, put
 
 CSV_ROW_BYTES = 130
 """About what a row of a CSV file takes: ten numbers, most with all their digits."""
@@ -48,7 +49,7 @@ class TraceFile(ABC):
             if kind is None:
                 self._finish()
                 self._file.close()
-                self._part.replace(self.path)
+                put(self._part, self.path)
         except OSError as failed:
             raise HapticdError(f"{self.path}: cannot be written: {failed.strerror}") from failed
         finally:
@@ -126,8 +127,10 @@ def open_trace(path: Path, rows: int, overwrite: bool) -> TraceFile:
     """
     if path.suffix not in _SUFFIXES:
         raise ConfigError(f"{path}: must end in {' or '.join(_SUFFIXES)}")
-    if path.is_dir():
-        raise ConfigError(f"{path}: is a directory, not a file")
+    path = path.resolve() if path.is_symlink() else path  # a link stays a link
+    reason = obstacle(path)
+    if reason:
+        raise ConfigError(f"{path}: {reason}")
     if path.exists() and not overwrite:
         raise ConfigError(f"{path}: exists; add --overwrite to replace it")
     if not path.parent.is_dir():

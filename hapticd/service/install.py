@@ -16,6 +16,7 @@ from typing import Final
 
 from hapticd.errors import HapticdError
 from hapticd.paths import SYSTEM_CONFIG, directory
+from hapticd.replacing import obstacle
 
 UNITS: Final = ("hapticd.service", "hapticd@.service")
 
@@ -186,6 +187,9 @@ class Installation:
         previous = os.umask(0o022)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
+            reason = obstacle(target)
+            if reason:  # a link to /dev/null, for one, by which systemd masks a file
+                raise InstallationError(f"{target}: {reason}; remove it first")
             target.write_text(text)
             target.chmod(0o644)
         except OSError as error:

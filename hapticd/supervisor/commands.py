@@ -56,6 +56,8 @@ class CommandSocket:
     """
 
     def __init__(self, path: Path, tcp: str | None = None, ring: KeyRing | None = None) -> None:
+        if path.exists() and not path.is_socket():  # ZeroMQ would put its socket over it
+            raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
         self._path = path
         self._names = _names(ring)
         self._gate: CurveServer | None = None

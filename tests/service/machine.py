@@ -13,6 +13,7 @@ import os
 import platform
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import tempfile
@@ -31,6 +32,9 @@ SOURCE = Path(__file__).parent.parent.parent
 PACKAGES = ("systemd", "systemd-sysv", "dbus", "python3", "python3-venv", "make", "udev", "umockdev")
 TOOLS = ("systemd-nspawn", "debootstrap", "nsenter", "apt-get")
 PLATFORMS = ("manylinux2014_x86_64", "manylinux_2_17_x86_64", "manylinux_2_28_x86_64", "manylinux_2_34_x86_64")
+NODES = {"null": 3, "zero": 5, "full": 7, "random": 8, "urandom": 9}
+"""Devices that a machine gets copies of, by their minor numbers; the major number of all is 1."""
+
 PATH = "/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 
 
@@ -157,6 +161,9 @@ def booted(log: Path) -> Iterator[Machine]:
     """A machine for the time of a test module; skips where there can be none."""
     if os.geteuid() != 0:
         pytest.skip("only root can boot a machine")
+    broken = broken_nodes(Path("/dev"))
+    if broken:
+        pytest.fail(broken, pytrace=False)
     missing = [tool for tool in TOOLS if shutil.which(tool) is None]
     if missing:
         pytest.skip(f"missing: {', '.join(missing)}; `make packages` installs them")
@@ -176,6 +183,31 @@ def booted(log: Path) -> Iterator[Machine]:
             yield machine
         finally:
             machine.power_off()
+
+
+def broken_nodes(directory: Path) -> str:
+    """Which devices are there no more, with the line that mends it; empty when all are.
+
+    A program that puts its output over /dev/null as root breaks it for every program; systemd-nspawn then only says
+    `Input/output error`.
+
+    Args:
+        directory: where they are, /dev.
+    """
+    broken = {}
+    for name, minor in NODES.items():
+        with contextlib.suppress(OSError):
+            node = (directory / name).stat()
+            if stat.S_ISCHR(node.st_mode) and node.st_rdev == os.makedev(1, minor):
+                continue
+        broken[directory / name] = minor
+    if not broken:
+        return ""
+    mend = "; ".join(f"rm -f {path}; mknod -m 666 {path} c 1 {minor}" for path, minor in broken.items())
+    return (
+        f"{', '.join(map(str, broken))}: not the device any more, so no machine can boot: a program that ran as root "
+        f"has put a file there. To mend it: sudo sh -c '{mend}'"
+    )
 
 
 def _made(cache: Path, kind: str, of: str, make: Callable[[Path], None]) -> Path:

@@ -196,7 +196,7 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot be written"):
         require_folder(tmp_path / "file" / "deeper", ["a.csv"])
     (tmp_path / "a.csv").mkdir()
-    with pytest.raises(ConfigError, match=r"a\.csv is a directory"):
+    with pytest.raises(ConfigError, match=r"a\.csv: is a directory"):
         require_folder(tmp_path, ["a.csv"])
     require_folder(tmp_path / "new" / "folder", ["a.csv"])
     assert list((tmp_path / "new" / "folder").iterdir()) == []

@@ -12,7 +12,7 @@ from hapticd.config.loading import load
 from hapticd.errors import ConfigError
 from hapticd.paths import directory
 from hapticd.progress import progress_bar
-from hapticd_studies.grid.output import require_extra, write
+from hapticd_studies.grid.output import require_extra, require_file, write
 
 _LONGEST_S = 60.0
 _MOST_LINES = 24  # of a configuration that is printed and not only saved
@@ -42,8 +42,10 @@ def command(
         raise ConfigError(f"--tolerance {tolerance:g}: must be a share, 0 to 10; 0.05 is 5 %")
     if not 0.5 <= duration <= _LONGEST_S:
         raise ConfigError(f"--duration {duration:g}: must be from 0.5 to {_LONGEST_S:g} s")
-    if output is not None and (output.is_dir() or not output.parent.is_dir()):
-        raise ConfigError(f"--output {output}: must be a file in a directory that there is")
+    if output is not None and not output.parent.is_dir():
+        raise ConfigError(f"--output {output}: there is no directory {output.parent}")
+    if output is not None:
+        require_file(output)
     loaded = load(config or directory("config") / "every-term.toml")
 
     from hapticd_studies.scene import report

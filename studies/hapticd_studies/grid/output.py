@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticd.errors import ConfigError, HapticdError
+from hapticd.replacing import obstacle, put
 
 
 def require_extra(extra: str, *modules: str) -> None:
@@ -75,16 +76,31 @@ def require_folder(folder: Path, names: Sequence[str]) -> None:
     except OSError as error:
         raise ConfigError(f"--output {folder}: cannot be written: {error.strerror}") from None
     for name in names:
-        if (folder / name).is_dir():
-            raise ConfigError(f"--output {folder}: {name} is a directory there")
+        require_file(folder / name)
+
+
+def require_file(file: Path) -> None:
+    """Refuse a name that belongs to something else than a file, such as /dev/null.
+
+    Raises:
+        ConfigError: it does, or this user may not look.
+    """
+    try:
+        reason = obstacle(file.resolve())
+    except OSError as error:
+        reason = error.strerror or str(error)
+    if reason:
+        raise ConfigError(f"--output {file}: {reason}")
 
 
 def write(file: Path, content: bytes) -> None:
     """Put a file in its place at once, so that an interruption leaves no half of it."""
+    require_file(file)
+    file = file.resolve()  # a link stays a link
     part = file.with_name(f".{file.name}.part")
     try:
         part.write_bytes(content)
-        part.replace(file)
+        put(part, file)
     except OSError as error:
         raise HapticdError(f"{file}: cannot be written: {error.strerror}") from None
 

@@ -1,0 +1,48 @@
+"""Putting a finished file in its place: the one way in which hapticd gives a file a name that was taken.
+
+A rename puts a file over anything: as root, over /dev/null, and then nothing on the computer works as it should.
+"""
+
+from __future__ import annotations
+
+import errno
+import stat
+from pathlib import Path
+
+_KINDS = {
+    stat.S_IFDIR: "a directory",
+    stat.S_IFLNK: "a link",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def obstacle(path: Path) -> str:
+    """What is in the way of a file of this name, such as `is a device, not a file`; empty where a file may go.
+
+    Raises:
+        OSError: this user may not look.
+    """
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return ""
+    return "" if stat.S_ISREG(mode) else f"is {_KINDS.get(stat.S_IFMT(mode), 'something else')}, not a file"
+
+
+def put(finished: Path, path: Path) -> None:
+    """Give a finished file its name at once, in the place of an older file or of none.
+
+    Args:
+        finished: the file, in the directory of `path`.
+        path: its name.
+
+    Raises:
+        OSError: the name belongs to something that is no regular file, or this user may not.
+    """
+    reason = obstacle(path)
+    if reason:
+        raise OSError(errno.EINVAL, reason, str(path))
+    finished.rename(path)
