@@ -20,10 +20,10 @@ from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.simulate import simulate
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.boundaries import Loop, stable_limit
+from hapticd_studies.felt import felt_index, threshold_m
 from hapticd_studies.law_spec import LawSpec, parse_laws
 from hapticd_studies.transparency import references, scores
 from hapticd_studies.transparency.devices import Held, draw
-from hapticd_studies.transparency.felt import felt_index, threshold_m
 from hapticd_studies.transparency.hands import HOLD, IN, KINDS, LET_GO_S, OUT, movement
 from hapticd_studies.transparency.references import calm, least_damping
 from hapticd_studies.transparency.runs import COLUMNS, columns_of, moving_runs, rows, times_of

@@ -28,6 +28,10 @@ app = lazy_group(
             f"{_COMMANDS}.accuracy:command",
             "Measure what every shortcut costs in accuracy, and what every bit of accuracy costs in time.",
         ),
+        "devices": (
+            f"{_COMMANDS}.devices:command",
+            "Hold the device model against limits that others have published.",
+        ),
         "scene": (f"{_COMMANDS}.scene:command", "Find the smallest model that keeps every answer of a scene."),
         "extremes": (
             f"{_COMMANDS}.extremes:command",

@@ -16,11 +16,11 @@ import numpy.typing as npt
 from hapticd.law import state_fields
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.simulation.batch import Batch, BatchResult, Point
+from hapticd_studies.felt import MOVING_HZ, WINDOW_S, felt_index
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.transparency import arrivals, scores
 from hapticd_studies.transparency.arrivals import GENTLE, HARD, Arrival
 from hapticd_studies.transparency.devices import MAX_FORCE_N, Held
-from hapticd_studies.transparency.felt import MOVING_HZ, WINDOW_S, felt_index
 
 Array = npt.NDArray[np.float64]
 Row = list[float]

@@ -1,0 +1,1 @@
+"""Limits and orders that others have published, against the device model."""
