@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.cli import main
+from hapticd.offline.outcome import Outcome
 from hapticd.simulation.batch import TRACE_COLUMNS
 from hapticd.tick.energy import EnergyLedger
 from hapticd_studies.extremes.long_run import (
@@ -25,6 +27,8 @@ from hapticd_studies.extremes.long_run import (
     enter,
     run_days,
 )
+from hapticd_studies.extremes.report import ExtremesReport
+from hapticd_studies.extremes.sweep import COLUMNS, ExtremesPlan
 
 NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False).filter(lambda value: value == 0.0 or abs(value) > 1e-100)
 
@@ -68,11 +72,18 @@ def test_minutes_of_both_days_keep_their_sums_and_go_on_learning() -> None:
     days = run_days(120_000, told.append)
     assert told == [12_000 * chunk for chunk in range(1, 11)]
     assert [day.hand for day in days] == list(HANDS)
+    plan = ExtremesPlan(1, 0)
+    lines = ExtremesReport(plan, np.zeros((0, len(COLUMNS))), {}, days).lines()
     for day in days:
         assert day.ticks == 120_000
         assert max(day.errors.values()) < SUM_SHARE
         assert day.cycles_at_last >= 12 * 2
         assert day.holds
+        assert day.kept_n_s_per_m >= day.damping_n_s_per_m > day.adapted_n_s_per_m
+        (text,) = (line.text for line in lines if day.hand in line.text)
+        assert f"{day.damping_n_s_per_m:.3g}" in text
+        assert f"{day.adapted_n_s_per_m:.3g}" in text
+        assert not replace(day, kept_outcome=Outcome.MOVING).holds
         assert day.resolution_j < 1e-10 * abs(day.cycle_j)
 
 

@@ -1,8 +1,8 @@
 """A day without a pause: the energy sums after 8.64e7 ticks against compensated ones, and whether the law still adapts.
 
 Two devices run the loop of the daemon for 24 h at 1 kHz. The reference adds the same products with twice the digits.
-Then the damping that they have learnt is taken from them, and each, as old as it is, is dropped onto a stiffer wall,
-where nothing settles without damping.
+Then each, as old as it is, is dropped onto a stiffer wall, where nothing settles without damping: once with the damping
+that it has learnt, and once without, to see that it can still learn.
 """
 
 from __future__ import annotations
@@ -61,8 +61,10 @@ class LongRun:
         cycle_j: the energy that the last cycle made [J].
         running_j: the sum in which law and ledger look for cycles, at the end [J].
         damping_n_s_per_m: of the law at the end of the day.
-        adapted_n_s_per_m, fresh_n_s_per_m: damping after the new wall, of this law and of a new one.
-        outcome, fresh_outcome: `Outcome` on the new wall, of this law and of a new one.
+        kept_n_s_per_m: damping after the new wall, of this law as it was.
+        adapted_n_s_per_m: the same, of this law after its damping was set to 0.
+        fresh_n_s_per_m: the same, of a new law.
+        kept_outcome, outcome, fresh_outcome: `Outcome` on the new wall, of these three.
     """
 
     hand: str
@@ -76,8 +78,10 @@ class LongRun:
     cycle_j: float
     running_j: float
     damping_n_s_per_m: float
+    kept_n_s_per_m: float
     adapted_n_s_per_m: float
     fresh_n_s_per_m: float
+    kept_outcome: Outcome
     outcome: Outcome
     fresh_outcome: Outcome
 
@@ -88,6 +92,7 @@ class LongRun:
             all(error <= SUM_SHARE for error in self.errors.values())
             and self.cycles_at_last > 0
             and abs(self.cycles_at_last - self.cycles_at_first) <= 0.01 * self.cycles_at_first + 20.0
+            and self.kept_outcome is Outcome.SETTLED
             and self.outcome is Outcome.SETTLED
             and self.adapted_n_s_per_m > 0.0
         )
@@ -116,7 +121,7 @@ def run_days(ticks: int = DAY_TICKS, progress: Callable[[int], None] | None = No
         if progress:
             progress((chunk + 1) * chunk_ticks)
     tenth = chunks // 10
-    fresh, aged = _examined(arrays)
+    fresh, kept, emptied = _examined(arrays)
     days = []
     for at, hand in enumerate(HANDS):
         ledger, turnover = arrays.ledgers[at], sums[at, TURNOVER]
@@ -138,9 +143,11 @@ def run_days(ticks: int = DAY_TICKS, progress: Callable[[int], None] | None = No
                 cycle_j=float(ledger["cycle_generated_j"]),
                 running_j=max(abs(float(ledger["_since_j"])), abs(float(arrays.law_states[at]["energy_j"]))),
                 damping_n_s_per_m=float(arrays.law_states[at]["damping_n_s_per_m"]),
-                adapted_n_s_per_m=aged[at][1],
+                kept_n_s_per_m=kept[at][1],
+                adapted_n_s_per_m=emptied[at][1],
                 fresh_n_s_per_m=fresh[at][1],
-                outcome=aged[at][0],
+                kept_outcome=kept[at][0],
+                outcome=emptied[at][0],
                 fresh_outcome=fresh[at][0],
             )
         )
@@ -152,19 +159,20 @@ def _device(force: dict[str, Any], **keys: Any) -> SimulationOptions:
 
 
 def _examined(old: Any) -> list[list[tuple[Outcome, float]]]:
-    """Outcome and damping of new laws, and of old ones without their damping, dropped by 5 mm onto a stiffer wall."""
+    """Outcome and damping of new laws, old ones, and old ones without their damping, dropped onto a stiffer wall."""
     law, criterion = plugins.law(LAW), Criterion()
     device = _device({"profile": "constant", "newton": -3.0}, initial_position_m=5e-3)
     point = Point(device, WallConfig(stiffness_n_per_m=NEW_STIFFNESS_N_PER_M), law.Params(), PERIOD_S)
     points = [point] * len(HANDS)
     found = []
-    for aged in (False, True):
+    for aged, emptied in ((False, False), (True, False), (True, True)):
         batch = Batch(law, points, EXAM_S, criterion.window_s)
         arrays = batch.arrays()
         if aged:
             arrays.law_states[:] = old.law_states
-            arrays.law_states["damping_n_s_per_m"] = 0.0
             arrays.ledgers[:] = old.ledgers
+        if emptied:
+            arrays.law_states["damping_n_s_per_m"] = 0.0
         batch.run_on(arrays)
         outcomes = judge(criterion, points, batch.result(arrays))
         damping = arrays.law_states["damping_n_s_per_m"]
