@@ -28,6 +28,7 @@ COMMANDS: Final = {
     "calibrate": ("remote", "Calibrate a running daemon's device, which moves its arm."),
     "tare": ("remote", "Take the present position as the scene's origin."),
     "clear": ("remote", "Clear the fault that stopped a running daemon."),
+    "mark": ("remote", "Put a marker into a running daemon's event stream."),
     "reload": ("remote", "Let a running daemon take its edited file over."),
     "switch": ("switch", "Put another law into the file, and into force."),
     "fault": ("fault", "List, show or export the records of faults."),

@@ -1,4 +1,4 @@
-"""Requests to a running daemon: `hapticd arm`, `disarm`, `calibrate`, `tare`, `clear`, `reload`.
+"""Requests to a running daemon: `hapticd arm`, `disarm`, `calibrate`, `tare`, `clear`, `mark`, `reload`.
 
 Also the options that say which daemon: one of this computer by its name, or another computer's by its endpoint.
 """
@@ -81,6 +81,21 @@ def tare(
     Example: hapticd tare
     """
     command("tare", instance, connect=connect, keys=keys)
+
+
+def mark(
+    text: Annotated[str, typer.Argument(help="The marker: one line of at most 200 characters.")],
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Put a marker into a running daemon's event stream.
+
+    It is event 111 with this text, and so in every recording and with every subscriber; armed or not.
+
+    Example: hapticd mark "trial 3 begins"
+    """
+    command("mark", instance, connect=connect, keys=keys, text=text)
 
 
 def calibrate(

@@ -50,15 +50,17 @@ def command(
     long as the daemon lives.
 
     Args:
-        do: `status`, `arm`, `disarm`, `calibrate`, `tare`, `clear`, `reload` or `stop`.
+        do: `status`, `receipt`, `arm`, `disarm`, `calibrate`, `tare`, `clear`, `mark`, `reload` or `stop`.
         instance: which daemon on this computer, when no endpoint is given.
         timeout_s: how long the daemon may be silent [s].
         connect: the daemon's `control.tcp` as seen from here, such as "tcp://lab.example:9873".
         keys: key file for it; None: the one that $HAPTICD_KEYS names.
-        fields: what else belongs to the request; `wait=True` makes `reload` answer with its verdict.
+        fields: what else belongs to the request: the `text` of `mark`; `wait=True` makes `reload` answer with its
+            verdict.
 
     Returns:
-        The answer: `ok`, `text`, and for `status` the fields of `hapticd/status` under `status`.
+        The answer: `ok`, `text`, and for `status` the fields of `hapticd/status` under `status`, for `receipt` what a
+        recording says of itself under `receipt`.
 
     Raises:
         ConfigError: the key file cannot be used.

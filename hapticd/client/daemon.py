@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from hapticd.client.commands import TIMEOUT_S, calibrate, command
 from hapticd.client.connection import Client
@@ -111,6 +112,22 @@ class DaemonClient(Client):
         """Clear the fault that stopped the daemon; it stays disarmed until armed."""
         self._ask("clear")
 
+    def mark(self, text: str) -> None:
+        """Put a marker into the event stream, and so into every recording; armed or not.
+
+        Args:
+            text: one line of at most 200 printable characters.
+        """
+        self._ask("mark", text=text)
+
+    def receipt(self) -> dict[str, Any]:
+        """What a recording of this daemon says of itself.
+
+        The keys of `hapticd/status`, and config_text, kernel, machine and python of the daemon's side.
+        """
+        found: dict[str, Any] = self._ask("receipt")["receipt"]
+        return found
+
     def reload(self) -> None:
         """Have the daemon take its edited file over; returns when the file is in force.
 
@@ -133,8 +150,8 @@ class DaemonClient(Client):
                 raise SilenceError(f"{self.endpoint}: no daemon answers{advice}")
             self._ahead.extend(message)
 
-    def _ask(self, do: str, **fields: bool) -> None:
-        command(do, self._instance, connect=self._endpoint(), keys=self._keys, **fields)
+    def _ask(self, do: str, **fields: Any) -> dict[str, Any]:
+        return command(do, self._instance, connect=self._endpoint(), keys=self._keys, **fields)
 
     def _endpoint(self) -> str | None:
         if not self._may_command:

@@ -150,12 +150,19 @@ def receipt(event: LoopEvent, epoch_s: float, instance: str, config: LoadedConfi
             "rate_hz": config.config.loop.rate_hz,
             "law": config.config.controller.law,
             "config": {"file": str(config.path), "sha256": config.sha256, "text": config.text},
-            "kernel": f"{platform.system()} {platform.release()} {platform.version()}",
-            "machine": platform.machine(),
-            "python": platform.python_version(),
+            **machine(),
         }
     )
     return told
+
+
+def machine() -> dict[str, str]:
+    """The computer in a receipt: kernel, processor architecture, Python."""
+    return {
+        "kernel": f"{platform.system()} {platform.release()} {platform.version()}",
+        "machine": platform.machine(),
+        "python": platform.python_version(),
+    }
 
 
 def _plain(value: Any) -> Any:

@@ -6,13 +6,14 @@ import time
 from dataclasses import replace
 from typing import Any
 
+from hapticd.faults.record import machine
 from hapticd.supervisor.commands import Reply
 from hapticd.supervisor.events import log
 from hapticd.supervisor.request_queue import Answer
 from hapticd.supervisor.state import DaemonState
-from hapticd.tick.event import EventCode
+from hapticd.tick.event import EventCode, marker_problem
 
-KNOWN = ("status", "arm", "disarm", "calibrate", "tare", "clear", "reload", "stop")
+KNOWN = ("status", "receipt", "arm", "disarm", "calibrate", "tare", "clear", "mark", "reload", "stop")
 """What the control socket understands."""
 
 PATIENCE_NS = 5_000_000_000
@@ -33,11 +34,15 @@ class CommandHandler:
         """Do what has been asked for, or pass it on to the loop, whose answer comes later."""
         state = self._state
         for request, reply, who in state.commands.receive():
-            if request["do"] in KNOWN[1:]:
+            if request["do"] in KNOWN[2:]:
                 log.info("%s: asked by %s", request["do"], who)
             match request["do"]:
                 case "status":
                     reply(True, status=state.status.made.as_map(), clock_ns=time.monotonic_ns())
+                case "receipt":
+                    reply(True, receipt=self._receipt())
+                case "mark":
+                    self._mark(request.get("text"), reply)
                 case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if state.recovery.lost:
                     self._without_device(do, reply)
                 case "disarm":
@@ -54,6 +59,22 @@ class CommandHandler:
                     reply(True)
                 case other:
                     reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
+
+    def _receipt(self) -> dict[str, Any]:
+        """What a recording of this daemon says of itself: status, the whole configuration, the computer."""
+        state = self._state
+        return {
+            **state.status.made.as_map(),
+            "config_hash": state.config.hash,
+            "config_text": state.config.text,
+            **machine(),
+        }
+
+    def _mark(self, text: object, reply: Reply) -> None:
+        problem = marker_problem(text)
+        if not problem:
+            self._state.tell(EventCode.MARKED, str(text))
+        reply(not problem, problem)
 
     def _without_device(self, do: str, reply: Reply) -> None:
         """What can be done while the device is away is said to the loop that will find it again."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 
+LONGEST_MARKER = 200
+"""Characters of a marker at most."""
+
 
 class EventCode(enum.IntEnum):
     """1xx: life; 2xx: faults that take the force away; 3xx: warnings."""
@@ -20,6 +23,7 @@ class EventCode(enum.IntEnum):
     CALIBRATING = 108
     CALIBRATED = 109
     TARED = 110
+    MARKED = 111
 
     LAW_FAILED = 200
     LAW_OVER_BUDGET = 201
@@ -64,3 +68,14 @@ class LoopEvent:
     def is_fault(self) -> bool:
         """Whether it took the force away."""
         return 200 <= self.code < 300
+
+
+def marker_problem(text: object) -> str:
+    """Why this cannot be the text of a marker; "" when it can."""
+    if not isinstance(text, str) or not text.strip():
+        return "a marker is a text that is not empty"
+    if len(text) > LONGEST_MARKER:
+        return f"a marker has at most {LONGEST_MARKER} characters, this one {len(text)}"
+    if not text.isprintable():
+        return "a marker is one line of printable characters"
+    return ""
