@@ -1,0 +1,105 @@
+"""A recording as a table for other programs: CSV, Parquet, npz. Every float comes back with the same bits."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+
+from hapticd.errors import ConfigError, HapticdError
+from hapticd_views.recording.columns import Values
+from hapticd_views.recording.recording import Recording
+
+TICKS = "ticks"
+"""The table of all topics that have a message every tick."""
+
+Table = dict[str, Values]
+
+
+def export(recording: Recording, output: Path, topic: str = TICKS, overwrite: bool = False) -> int:
+    """Write one table of a recording; a key with an element an axis or a wall is a column each, `position_m[0]`.
+
+    Args:
+        recording: the recording.
+        output: where; .csv, .parquet or .npz, in which such keys stay tables. It appears when it is complete.
+        topic: "ticks", or a topic of the recording such as "cycle".
+        overwrite: whether a file of this name may be replaced.
+
+    Returns:
+        Its rows.
+
+    Raises:
+        ConfigError: no such topic, or the output cannot be written there.
+        HapticdError: the disk is full.
+    """
+    write = _WRITERS.get(output.suffix)
+    if write is None:
+        raise ConfigError(f"{output}: must end in {', '.join(_WRITERS)}")
+    if output.exists() and not overwrite:
+        raise ConfigError(f"{output}: exists; add --overwrite to replace it")
+    table = recording.ticks if topic == TICKS else recording.topics.get(topic)
+    if not table:
+        raise ConfigError(f"{recording.path}: has no {topic!r}; there is {', '.join([TICKS, *recording.topics])}")
+    part = output.with_name(f".{output.name}.{os.getpid()}.part")
+    try:
+        write(table, part)
+        part.replace(output)
+    except OSError as error:
+        raise HapticdError(f"{output}: cannot be written: {error.strerror or error}") from error
+    finally:
+        part.unlink(missing_ok=True)
+    return len(table["run"])
+
+
+def single_columns(table: Table) -> Table:
+    """The table with one column for each element of those keys that have several."""
+    found: Table = {}
+    for name, values in table.items():
+        if isinstance(values, np.ndarray) and values.ndim == 2:
+            found |= {f"{name}[{at}]": values[:, at] for at in range(values.shape[1])}
+        else:
+            found[name] = values
+    return found
+
+
+def _write_csv(table: Table, path: Path) -> None:
+    columns = single_columns(table)
+    plain = [values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values()]
+    with path.open("x", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*plain, strict=True))  # a float is written as repr has it: the shortest that comes back
+
+
+def _write_parquet(table: Table, path: Path) -> None:
+    columns = {name: _parquet_column(values) for name, values in single_columns(table).items()}
+    pyarrow.parquet.write_table(pyarrow.table(columns), path)
+
+
+def _parquet_column(values: Values) -> Any:
+    if isinstance(values, list):
+        return pyarrow.array([one if one is None or isinstance(one, str) else str(one) for one in values])
+    return pyarrow.array(np.ascontiguousarray(values))
+
+
+def _write_npz(table: Table, path: Path) -> None:
+    columns: Any = {name: _npz_column(values) for name, values in table.items()}
+    with path.open("xb") as file:
+        np.savez(file, **columns)
+
+
+def _npz_column(values: Values) -> Any:
+    return values if isinstance(values, np.ndarray) else np.array([str(one) for one in values])
+
+
+_WRITERS: dict[str, Callable[[Table, Path], None]] = {
+    ".csv": _write_csv,
+    ".parquet": _write_parquet,
+    ".npz": _write_npz,
+}

@@ -1,0 +1,57 @@
+"""The receipt of a recording: what was recorded, under which configuration, on which computer.
+
+In the file it is a metadata record of texts, one at the beginning and one at each change, so that any tool shows it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from hapticd.errors import HapticdError
+from hapticd.telemetry.records import Status
+from hapticd.version import __version__
+
+METADATA = "hapticd receipt"
+"""Name of the metadata record."""
+
+_JSON = {field.name for field in dataclasses.fields(Status) if field.type != "str"}
+_COUNTS = (
+    "seq", "measured_rate_hz", "ticks", "overruns", "late_histogram", "late_max_us", "busy_max_us", "ring_drops",
+    "event_drops", "next_try_timestamp",
+)  # fmt: skip
+"""What a status counts; the recording has it as it goes on."""
+
+
+def make_receipt(status: Status, asked: Mapping[str, Any] | HapticdError) -> dict[str, Any]:
+    """What is in force.
+
+    Args:
+        status: the newest of the daemon.
+        asked: what it answers when asked for a receipt, or why it cannot be asked.
+    """
+    told: dict[str, Any] = {**status.as_map(), "config_text": "", "config_missing": ""}
+    if isinstance(asked, HapticdError):
+        told["config_missing"] = str(asked)
+    else:
+        told.update(asked)
+    for key in _COUNTS:
+        told.pop(key, None)
+    wire = {"timestamp": status.timestamp, "schema": status.schema, "every_ticks": status.every_ticks}
+    return {**told, **wire, "recorder_version": __version__}
+
+
+def as_texts(receipt: Mapping[str, Any]) -> dict[str, str]:
+    """A receipt as the texts of a metadata record."""
+    return {key: json.dumps(value, default=str) if key in _JSON else str(value) for key, value in receipt.items()}
+
+
+def from_texts(texts: Mapping[str, str]) -> dict[str, Any]:
+    """The receipt that these are the texts of.
+
+    Raises:
+        ValueError: they are of none.
+    """
+    return {key: json.loads(text) if key in _JSON else text for key, text in texts.items()}

@@ -1,0 +1,221 @@
+"""Record a running daemon: what it publishes goes into MCAP files, through restarts of the daemon, until it is over."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hapticd.client import DaemonClient
+from hapticd.errors import HapticdError, SchemaError, WireError
+from hapticd.telemetry.records import Gap, Position, Record, Status
+from hapticd_views.recording.file import RecordingFile
+from hapticd_views.recording.messages import Note, recorded_gap
+from hapticd_views.recording.receipt import METADATA, as_texts, make_receipt
+
+CHUNK_S = 0.4
+"""Time of the ticks in a chunk at most; with one message more less than the half second that a kill may lose [s]."""
+
+SYNC_S = 5.0
+"""Time between two syncs: what a power cut may lose [s]."""
+
+_WAIT_S = 0.05
+_REFUSED_S = 1.0  # notes of messages that cannot be used come no faster
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When a file ends and the next one begins.
+
+    Attributes:
+        size_bytes: at this size; None: never.
+        duration_s: after this time [s]; None: never.
+    """
+
+    size_bytes: float | None = None
+    duration_s: float | None = None
+
+    @property
+    def rotate(self) -> bool:
+        """Whether there may be several files."""
+        return self.size_bytes is not None or self.duration_s is not None
+
+
+@dataclass(slots=True)
+class Progress:
+    """How far a recording is.
+
+    Attributes:
+        files: written so far, the present one last.
+        duration_s: since it began [s].
+        ticks: recorded.
+        bytes: on the disk, in all files.
+        gaps, missing: gaps, and the ticks that did not arrive.
+        refused: messages that were not what the contract says.
+        restarts: of the daemon.
+    """
+
+    files: list[Path] = field(default_factory=list)
+    duration_s: float = 0.0
+    ticks: int = 0
+    bytes: int = 0
+    gaps: int = 0
+    missing: int = 0
+    refused: int = 0
+    restarts: int = 0
+
+
+class Recorder:
+    """Writes what a daemon publishes.
+
+    Args:
+        daemon: the daemon; which topics it was asked for decides what is recorded.
+        output: the file; with limits that rotate, `F.mcap` stands for `F-001.mcap` and so on.
+        limits: when the next file begins.
+        overwrite: whether files may be replaced.
+
+    Attributes:
+        progress: how far it is.
+    """
+
+    def __init__(self, daemon: DaemonClient, output: Path, limits: Limits, overwrite: bool = False) -> None:
+        self.progress = Progress()
+        self._daemon = daemon
+        self._output = output
+        self._limits = limits
+        self._overwrite = overwrite
+        self._in_force: tuple[str, float] | None = None
+        self._receipt: dict[str, Any] = {}
+        self._gaps: list[Gap] = []
+        self._written_bytes = 0
+        self._refused_due_s = 0.0
+
+    def run(
+        self,
+        stopped: Callable[[], bool],
+        duration_s: float | None = None,
+        tell: Callable[[Progress], object] | None = None,
+    ) -> Progress:
+        """Record until it is stopped, or this time has passed.
+
+        Args:
+            stopped: asked every 50 ms at least.
+            duration_s: how long to record [s]; None: until stopped.
+            tell: hears of the progress with every chunk.
+
+        Raises:
+            ConfigError: the file cannot be created.
+            DiskError: the disk does not take any more; what was recorded is readable.
+            SchemaError: the daemon was replaced by one whose schema is not known; the file is complete.
+        """
+        began_s = self._synced_s = time.monotonic()
+        self._begin_file()
+        try:
+            while not stopped() and (duration_s is None or time.monotonic() - began_s < duration_s):
+                self._take(self._receive())
+                now_s = time.monotonic()
+                self.progress.duration_s = now_s - began_s
+                if now_s - self._committed_s >= CHUNK_S:
+                    self._commit()
+                    if tell is not None:
+                        tell(self.progress)
+        except SchemaError as error:
+            self._note(str(error))
+            self._end_file()
+            raise
+        self._note("recording stopped")
+        self._end_file()
+        return self.progress
+
+    def _begin_file(self) -> None:
+        number = len(self.progress.files) + 1
+        path = self._output.with_stem(f"{self._output.stem}-{number:03d}") if self._limits.rotate else self._output
+        self._file = RecordingFile(path, self._overwrite)
+        self.progress.files.append(path)
+        self._committed_s = self._file_since_s = time.monotonic()
+        self._first_s: float | None = None
+        self._last_s = time.time()
+        if self._receipt:
+            self._file.describe(METADATA, as_texts({**self._receipt, "timestamp": self._last_s}))
+        elif self._daemon.latest_status is not None:
+            self._look_at(self._daemon.latest_status)
+
+    def _receive(self) -> list[Record]:
+        try:
+            return self._daemon.receive(_WAIT_S)
+        except SchemaError:
+            raise
+        except WireError as error:
+            self.progress.refused += 1
+            if time.monotonic() >= self._refused_due_s:
+                self._refused_due_s = time.monotonic() + _REFUSED_S
+                self._note(f"message refused, {self.progress.refused} so far: {error}")
+            return []
+
+    def _take(self, records: list[Record]) -> None:
+        for record in records:
+            if isinstance(record, Gap):
+                self._gaps.append(record)
+                continue
+            if isinstance(record, Status):
+                self._look_at(record)
+            if self._first_s is None:
+                self._first_s = record.timestamp
+            elif abs(record.timestamp - self._first_s) >= CHUNK_S:
+                self._commit()
+                self._first_s = record.timestamp
+            for gap in self._gaps:
+                self._file.add(recorded_gap(gap, record.timestamp), record.timestamp)
+                if gap.topic is Position.topic:
+                    self.progress.gaps += 1
+                    self.progress.missing += gap.missing
+            self._gaps.clear()
+            self._file.add(record, record.timestamp)
+            self._last_s = record.timestamp
+            if isinstance(record, Position):
+                self.progress.ticks += 1
+
+    def _look_at(self, status: Status) -> None:
+        """Write a receipt where another configuration is in force, or another daemon."""
+        in_force = (status.config_hash, status.started_timestamp)
+        if in_force == self._in_force:
+            return
+        restarted = self._in_force is not None and self._in_force[1] != status.started_timestamp
+        self._in_force = in_force
+        if restarted:
+            self._commit()
+            self.progress.restarts += 1
+            pause_s = max(0.0, status.timestamp - self._last_s)
+            self._note(f"the daemon was started anew; nothing came for {pause_s:.1f} s", restart=True)
+        asked: dict[str, Any] | HapticdError
+        try:
+            asked = self._daemon.receipt()
+        except HapticdError as error:
+            asked = error
+        self._receipt = make_receipt(status, asked)
+        self._file.describe(METADATA, as_texts(self._receipt))
+
+    def _note(self, text: str, restart: bool = False) -> None:
+        self._file.add(Note(self._last_s, text, restart), self._last_s)
+
+    def _commit(self) -> None:
+        self._file.commit()
+        self._first_s = None
+        now_s = self._committed_s = time.monotonic()
+        self.progress.bytes = self._written_bytes + self._file.size
+        if now_s - self._synced_s >= SYNC_S:
+            self._file.sync()
+            self._synced_s = now_s
+        limits = self._limits
+        if (limits.size_bytes is not None and self._file.size >= limits.size_bytes) or (
+            limits.duration_s is not None and now_s - self._file_since_s >= limits.duration_s
+        ):
+            self._end_file()
+            self._begin_file()
+
+    def _end_file(self) -> None:
+        self._file.close()
+        self._written_bytes += self._file.size
+        self.progress.bytes = self._written_bytes

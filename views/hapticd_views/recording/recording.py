@@ -1,0 +1,156 @@
+"""A recording that was read: columns a topic, and what happened in it."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.errors import HapticdError
+from hapticd.telemetry.records import Cycle, Event
+from hapticd.tick.event import EventCode
+from hapticd_views.recording.columns import Values
+from hapticd_views.recording.messages import Note, RecordedGap
+
+PER_TICK = ("position", "energy", "damping", "timing")
+"""Topics with a message every tick."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Recording:
+    """A recording.
+
+    Attributes:
+        path: the file.
+        receipts: what was in force, from the beginning on and from each change on; `timestamp` says since when.
+        topics: columns by topic, without "hapticd/", and by key of docs/telemetry.md; a row a message. A key with an
+            element an axis or a wall is a table. `run` counts the daemon's restarts, at each of which `seq` begins
+            anew.
+        gaps: ticks that did not arrive.
+        notes: what the recorder itself has seen.
+        cut: why the file ends before its proper end; "" when it does not.
+    """
+
+    path: Path
+    receipts: tuple[dict[str, Any], ...]
+    topics: dict[str, dict[str, Values]]
+    gaps: tuple[RecordedGap, ...]
+    notes: tuple[Note, ...]
+    cut: str
+
+    @property
+    def receipt(self) -> dict[str, Any]:
+        """What was in force when it began."""
+        return self.receipts[0]
+
+    @property
+    def complete(self) -> bool:
+        """Whether it ends where its recorder ended it."""
+        return not self.cut
+
+    @property
+    def config(self) -> LoadedConfig:
+        """The configuration that was in force when it began.
+
+        Raises:
+            HapticdError: the recorder could not get it.
+            ConfigError: this installation cannot use it, for example for want of a driver.
+        """
+        if not self.receipt["config_text"]:
+            raise HapticdError(f"{self.path}: has no configuration: {self.receipt['config_missing']}")
+        return parse(self.receipt["config_text"], f"{self.path}: {Path(self.receipt['config_file']).name}")
+
+    @property
+    def missing(self) -> int:
+        """Ticks that did not arrive, by the topic that lost most."""
+        return max((sum(gap.missing for gap in self.gaps if gap.topic == one.topic) for one in self.gaps), default=0)
+
+    @cached_property
+    def ticks(self) -> dict[str, Values]:
+        """The topics with a message every tick side by side: the ticks that are in all of them."""
+        tables = [self.topics[name] for name in PER_TICK if name in self.topics]
+        if not tables:
+            return {}
+        keys = [list(zip(table["run"].tolist(), table["seq"].tolist(), strict=True)) for table in tables]
+        places = [{key: row for row, key in enumerate(column)} for column in keys]
+        both = sorted(set.intersection(*(set(place) for place in places)))
+        joined: dict[str, Values] = {}
+        for table, place in zip(tables, places, strict=True):
+            rows = np.array([place[key] for key in both], np.int64)
+            for name, values in table.items():
+                if name == "invalid" and name in joined:
+                    joined[name] = joined[name] | values[rows]
+                elif name not in joined:
+                    joined[name] = values[rows]
+        return joined
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """What happened."""
+        return tuple(_records(Event, self.topics.get("event", {})))
+
+    @property
+    def markers(self) -> tuple[Event, ...]:
+        """The events that `hapticd mark` made; `text` is the marker."""
+        return tuple(event for event in self.events if event.code == EventCode.MARKED)
+
+    @cached_property
+    def cycles(self) -> tuple[Cycle, ...]:
+        """The cycles of energy exchange that were completed."""
+        return tuple(_records(Cycle, self.topics.get("cycle", {})))
+
+    @property
+    def duration_s(self) -> float:
+        """From its first tick to its last [s]."""
+        times = [table["timestamp"] for name, table in self.topics.items() if name in PER_TICK]
+        return float(max(one.max() for one in times) - min(one.min() for one in times)) if times else 0.0
+
+    def wall(self, index: int = 0) -> dict[str, Values]:
+        """What happened at one wall, as columns named as those of `hapticd.simulate`.
+
+        `x_m` is measured, relative to the wall and negative inside it; forces push out of it when positive; `t_s`
+        counts from the first tick, across restarts too. Energies are of all contacts.
+
+        Raises:
+            HapticdError: no such wall, or without its configuration it is not known which side of it is free.
+        """
+        axes, names = self.receipt["axes"], self.receipt["wall_axis"]
+        if not 0 <= index < len(names):
+            raise HapticdError(f"{self.path}: has {len(names)} walls, and no wall {index}")
+        axis = axes.index(names[index]) if len(axes) > 1 else 0
+        outward = 1.0 if self.config.config.scene.walls[index].free_side == "positive" else -1.0
+        ticks = self.ticks
+        found = {"t_s": ticks["timestamp"] - ticks["timestamp"][0]}
+        if "position_m" in ticks:
+            found["x_m"] = outward * (ticks["position_m"][:, axis] - self.receipt["wall_position_m"][index])
+            found["v_m_per_s"] = outward * ticks["velocity_m_per_s"][:, axis]
+            found["force_n"] = outward * ticks["force_n"][:, axis]
+            found["force_requested_n"] = outward * ticks["force_requested_n"][:, axis]
+        for name in ("energy_j", "spring_energy_j", "dissipated_j", "generated_j", "late_us", "busy_us", "dt_s"):
+            if name in ticks:
+                found[name] = ticks[name]
+        for name in ("damping_n_s_per_m", "in_contact", "felt_mass_kg"):
+            if name in ticks:
+                found[name] = ticks[name][:, index]
+        return found
+
+    def __repr__(self) -> str:
+        return (
+            f"<Recording {self.path}: {self.duration_s:.1f} s of {self.receipt['device']} with {self.receipt['law']}>"
+        )
+
+
+def _records(kind: type[Any], table: dict[str, Values]) -> list[Any]:
+    """Rows of a table as records again."""
+    names = [field.name for field in dataclasses.fields(kind) if field.name in table]
+    columns = [table[name].tolist() if isinstance(table[name], np.ndarray) else table[name] for name in names]
+    own = table.get("fields")
+    rows = [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]
+    if own is not None:
+        rows = [{**row, "fields": fields} for row, fields in zip(rows, own, strict=True)]
+    return [kind(**row) for row in rows]
