@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,9 @@ import numpy as np
 import pyarrow
 import pyarrow.parquet
 
-from hapticd.errors import ConfigError, HapticdError
+from hapticd.errors import ConfigError
 from hapticd_views.recording.columns import Values
+from hapticd_views.recording.output import part_of
 from hapticd_views.recording.recording import Recording
 
 TICKS = "ticks"
@@ -41,19 +41,11 @@ def export(recording: Recording, output: Path, topic: str = TICKS, overwrite: bo
     write = _WRITERS.get(output.suffix)
     if write is None:
         raise ConfigError(f"{output}: must end in {', '.join(_WRITERS)}")
-    if output.exists() and not overwrite:
-        raise ConfigError(f"{output}: exists; add --overwrite to replace it")
     table = recording.ticks if topic == TICKS else recording.topics.get(topic)
     if not table:
         raise ConfigError(f"{recording.path}: has no {topic!r}; there is {', '.join([TICKS, *recording.topics])}")
-    part = output.with_name(f".{output.name}.{os.getpid()}.part")
-    try:
+    with part_of(output, overwrite) as part:
         write(table, part)
-        part.replace(output)
-    except OSError as error:
-        raise HapticdError(f"{output}: cannot be written: {error.strerror or error}") from error
-    finally:
-        part.unlink(missing_ok=True)
     return len(table["run"])
 
 

@@ -20,6 +20,7 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.version import __version__
 from hapticd_views.recording.messages import encoder_of, schema_of, topic_of
+from hapticd_views.recording.output import place
 
 LIBRARY = f"hapticd {__version__}"
 """What the header of a recording names as its writer."""
@@ -48,7 +49,7 @@ class RecordingFile:
     """
 
     def __init__(self, path: Path, overwrite: bool = False) -> None:
-        self.path = path
+        self.path = place(path, overwrite)
         self.size = 0
         self._ends = [0]  # where the file may end: behind each of the last pieces that got to the disk whole
         self._pending = BytesIO()
@@ -56,9 +57,7 @@ class RecordingFile:
         self._channels: dict[type[Any], tuple[int, Any]] = {}
         flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | (os.O_TRUNC if overwrite else os.O_EXCL)
         try:
-            self._fd = os.open(path, flags, 0o666)
-        except FileExistsError:
-            raise ConfigError(f"{path}: exists; add --overwrite to replace it") from None
+            self._fd = os.open(self.path, flags, 0o666)
         except OSError as error:
             raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
         self._writer.start(library=LIBRARY)

@@ -8,8 +8,8 @@ from pathlib import Path
 from mcap.records import Channel, Metadata, Schema
 from mcap.writer import Writer
 
-from hapticd.errors import ConfigError, HapticdError
 from hapticd_views.recording.file import LIBRARY
+from hapticd_views.recording.output import part_of
 from hapticd_views.recording.scan import Scan
 
 
@@ -28,25 +28,14 @@ def repair(path: Path, output: Path, overwrite: bool = False) -> tuple[int, str]
         ConfigError: the output cannot be written there.
         HapticdError: the file cannot be read, is no MCAP file, or the disk is full.
     """
-    if output.exists() and not overwrite:
-        raise ConfigError(f"{output}: exists; add --overwrite to replace it")
-    if output.exists() and output.samefile(path):
-        raise ConfigError(f"{output}: is the file to be repaired; name another --output")
-    part = output.with_name(f".{output.name}.{os.getpid()}.part")
     scan = Scan(path)
-    try:
-        with part.open("xb") as file:
-            writer = Writer(file, chunk_size=1 << 28)  # chunks end where they ended
-            writer.start(library=LIBRARY)
-            count = _copy(scan, writer)
-            writer.finish()
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(output)
-    except OSError as error:
-        raise HapticdError(f"{output}: cannot be written: {error.strerror}") from error
-    finally:
-        part.unlink(missing_ok=True)
+    with part_of(output, overwrite) as part, part.open("xb") as file:
+        writer = Writer(file, chunk_size=1 << 28)  # chunks end where they ended
+        writer.start(library=LIBRARY)
+        count = _copy(scan, writer)
+        writer.finish()
+        file.flush()
+        os.fsync(file.fileno())
     return count, scan.cut
 
 

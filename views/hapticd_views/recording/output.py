@@ -1,0 +1,47 @@
+"""Where a command may write its output, and a file that appears there when it is complete."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from hapticd.errors import ConfigError, HapticdError
+from hapticd.replacing import obstacle, put
+
+
+def place(path: Path, overwrite: bool) -> Path:
+    """Where a file of this name goes: behind a link, what it leads to.
+
+    Raises:
+        ConfigError: something is there already, or it is no place for a file.
+    """
+    place = path.resolve() if path.is_symlink() else path
+    reason = obstacle(place)
+    if reason:
+        raise ConfigError(f"{place}: {reason}")
+    if place.exists() and not overwrite:
+        raise ConfigError(f"{path}: exists; add --overwrite to replace it")
+    if not place.parent.is_dir():
+        raise ConfigError(f"{path}: there is no directory {place.parent}")
+    return place
+
+
+@contextmanager
+def part_of(path: Path, overwrite: bool) -> Iterator[Path]:
+    """A file beside its place, to be written and closed; it is put there at the end, and gone after an error.
+
+    Raises:
+        ConfigError: as `place`.
+        HapticdError: it cannot be written, for example on a full disk.
+    """
+    there = place(path, overwrite)
+    part = there.with_name(f".{there.name}.{os.getpid()}.part")
+    try:
+        yield part
+        put(part, there)
+    except OSError as error:
+        raise HapticdError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        part.unlink(missing_ok=True)
