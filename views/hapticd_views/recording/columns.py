@@ -79,4 +79,7 @@ def _array(values: list[Any], what: str) -> Values:
     accepted = (int, float) if what == "number" else bool if what == "boolean" else int
     if not all(isinstance(one, accepted) for one in flat):
         raise TypeError(f"not every value is a JSON {what}")
-    return np.array(values, _DTYPES[what])
+    try:
+        return np.array(values, _DTYPES[what])
+    except OverflowError:  # an integer that no counter of ours reaches
+        return np.array(values, np.float64)

@@ -25,7 +25,7 @@ from hapticd_views.recording.output import place
 LIBRARY = f"hapticd {__version__}"
 """What the header of a recording names as its writer."""
 
-_LARGEST_NS = 2**64 - 1
+_LATEST_S = 1e10  # a time that is none, as of a forged message, is no reason to end
 
 
 class DiskError(HapticdError):
@@ -51,7 +51,7 @@ class RecordingFile:
     def __init__(self, path: Path, overwrite: bool = False) -> None:
         self.path = place(path, overwrite)
         self.size = 0
-        self._ends = [0]  # where the file may end: behind each of the last pieces that got to the disk whole
+        self._ends: list[int] = []  # where the file may end: behind each of the last pieces that are whole on the disk
         self._pending = BytesIO()
         self._writer = Writer(cast("IO[bytes]", _Counted(self)), chunk_size=1 << 22)
         self._channels: dict[type[Any], tuple[int, Any]] = {}
@@ -61,6 +61,7 @@ class RecordingFile:
         except OSError as error:
             raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
         self._writer.start(library=LIBRARY)
+        self._write_out()
 
     def add(self, record: Any, timestamp: float) -> None:
         """Take a record in; it is on the disk after the next `commit`.
@@ -76,7 +77,7 @@ class RecordingFile:
             channel_id = self._writer.register_channel(topic_of(kind), "json", schema_id)
             self._channels[kind] = channel_id, encoder_of(kind)
         channel_id, encode = self._channels[kind]
-        time_ns = min(max(0, round(timestamp * 1e9)), _LARGEST_NS)
+        time_ns = round(min(max(timestamp, 0.0), _LATEST_S) * 1e9)
         sequence = getattr(record, "seq", 0) & 0xFFFFFFFF
         self._writer.add_message(channel_id, time_ns, encode(record), time_ns, sequence)
 
@@ -143,15 +144,13 @@ class RecordingFile:
                 except OSError:
                     continue
             else:
-                os.ftruncate(self._fd, self._ends[0])
+                os.ftruncate(self._fd, min(self._ends, default=0))
         except OSError:
             pass  # the disk is gone, and with it what could be said in it
         finally:
             os.close(self._fd)
-        raise DiskError(
-            f"{self.path}: {error.strerror}: the recording ends here and is readable; make room, or name another "
-            "--output"
-        ) from error
+        state = "the recording ends here and is readable" if self._ends else "not even a beginning has room"
+        raise DiskError(f"{self.path}: {error.strerror}: {state}; make room, or name another --output") from error
 
 
 class _Counted:

@@ -10,7 +10,8 @@ from typing import Any
 
 from hapticd.client import DaemonClient
 from hapticd.errors import HapticdError, SchemaError, WireError
-from hapticd.telemetry.records import Gap, Position, Record, Status
+from hapticd.telemetry.records import Gap, Position, Record, Status, Tick
+from hapticd.telemetry.wire import Topic
 from hapticd_views.recording.file import RecordingFile
 from hapticd_views.recording.messages import Note, recorded_gap
 from hapticd_views.recording.receipt import METADATA, as_texts, make_receipt
@@ -22,6 +23,7 @@ SYNC_S = 5.0
 """Time between two syncs: what a power cut may lose [s]."""
 
 _WAIT_S = 0.05
+_UNEVEN_S = 1.0  # where some topics stay behind, the next file begins all the same
 _REFUSED_S = 1.0  # notes of messages that cannot be used come no faster
 
 
@@ -89,6 +91,7 @@ class Recorder:
         self._in_force: tuple[str, float] | None = None
         self._receipt: dict[str, Any] = {}
         self._gaps: list[Gap] = []
+        self._seqs: dict[Topic, int] = {}  # the last tick of each topic that has every one
         self._written_bytes = 0
         self._refused_due_s = 0.0
 
@@ -121,6 +124,7 @@ class Recorder:
                     self._commit()
                     if tell is not None:
                         tell(self.progress)
+                self._rotate(now_s)
         except SchemaError as error:
             self._note(str(error))
             self._end_file()
@@ -136,6 +140,7 @@ class Recorder:
         self.progress.files.append(path)
         self._committed_s = self._file_since_s = time.monotonic()
         self._first_s: float | None = None
+        self._full_since_s: float | None = None
         self._last_s = time.time()
         if self._receipt:
             self._file.describe(METADATA, as_texts({**self._receipt, "timestamp": self._last_s}))
@@ -176,6 +181,8 @@ class Recorder:
             self._last_s = record.timestamp
             if isinstance(record, Position):
                 self.progress.ticks += 1
+            if isinstance(record, Tick):
+                self._seqs[record.topic] = record.seq
 
     def _look_at(self, status: Status) -> None:
         """Write a receipt where another configuration is in force, or another daemon."""
@@ -208,10 +215,19 @@ class Recorder:
         if now_s - self._synced_s >= SYNC_S:
             self._file.sync()
             self._synced_s = now_s
-        limits = self._limits
-        if (limits.size_bytes is not None and self._file.size >= limits.size_bytes) or (
-            limits.duration_s is not None and now_s - self._file_since_s >= limits.duration_s
+
+    def _rotate(self, now_s: float) -> None:
+        """Begin the next file where this one has its size or time, if possible between two ticks."""
+        limits, age_s = self._limits, now_s - self._file_since_s
+        if self._full_since_s is None and (
+            (limits.size_bytes is not None and self._file.size >= limits.size_bytes)
+            or (limits.duration_s is not None and age_s >= limits.duration_s)
         ):
+            self._full_since_s = now_s
+        if self._full_since_s is None:
+            return
+        between = len(set(self._seqs.values())) <= 1
+        if between or now_s - self._full_since_s > _UNEVEN_S:
             self._end_file()
             self._begin_file()
 

@@ -1,0 +1,231 @@
+"""A recording is an MCAP file that other programs read, and one that was cut anywhere is read up to the cut."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+
+from hapticd.errors import ConfigError, HapticdError
+from hapticd.telemetry.records import Sent
+from hapticd_views.recording import read
+from hapticd_views.recording.file import DiskError, RecordingFile
+from hapticd_views.recording.messages import TELEMETRY, schema_of
+from hapticd_views.recording.repair import repair
+from tests.examples import examples
+from tests.views.recording.made import files_up_to, make
+
+TICKS, CHUNK_TICKS = 300, 40
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[list[Sent]]]:
+    path = tmp_path_factory.mktemp("made") / "whole.mcap"
+    return path, make(path, TICKS, CHUNK_TICKS)
+
+
+def boundaries(path: Path) -> list[int]:
+    """Where chunks end."""
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    return [index.chunk_start_offset + index.chunk_length for index in summary.chunk_indexes]
+
+
+def test_the_official_reader_reads_it_and_every_message_keeps_to_its_schema(
+    whole: tuple[Path, list[list[Sent]]],
+) -> None:
+    path, written = whole
+    with path.open("rb") as file:
+        list(StreamReader(file, validate_crcs=True).records)
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.metadata_count == 1
+        topics = {channel.topic for channel in summary.channels.values()}
+        assert {f"hapticd/{name}" for name in ("position", "energy", "damping", "timing", "status")} <= topics
+        messages = list(reader.iter_messages())
+    assert len(messages) == 4 * len(written) + 5
+    validators = {}
+    for schema, channel, message in messages:
+        assert schema is not None
+        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+        if schema.id not in validators:
+            told = json.loads(schema.data)
+            jsonschema.Draft202012Validator.check_schema(told)
+            validators[schema.id] = jsonschema.Draft202012Validator(told)
+        validators[schema.id].validate(json.loads(message.data))
+    positions = [message for _, channel, message in messages if channel.topic == "hapticd/position"]
+    assert [message.log_time for message in positions[:2]] == [1_700_000_000_000_000_000, 1_700_000_000_000_999_936]
+
+
+@pytest.mark.parametrize("record", TELEMETRY)
+def test_a_schema_says_what_every_key_is(record: type[Sent]) -> None:
+    told = schema_of(record)
+    assert told["type"] == "object", "Lichtblick takes no other"
+    assert all("description" in one for one in told["properties"].values()), told["properties"]
+
+
+def test_what_was_written_is_read(whole: tuple[Path, list[list[Sent]]]) -> None:
+    path, written = whole
+    recording = read(path)
+    assert (recording.complete, recording.cut) == (True, "")
+    assert recording.receipt["config_text"] == "[loop]\nrate_hz = 1000.0\n"
+    assert recording.receipt["axes"] == ["z", "x"]
+    assert recording.receipt["warnings"] == ["a line"]
+    for at, name in enumerate(("position", "energy", "damping", "timing")):
+        table = recording.topics[name]
+        for key in written[0][at].__slots__:
+            if key in table:
+                rows = [getattr(records[at], key) for records in written]
+                assert table[key].tolist() == [list(row) if isinstance(row, tuple) else row for row in rows], key
+    assert "invalid" not in recording.topics["position"]
+    assert recording.topics["energy"]["invalid"].nonzero()[0].tolist() == [7]
+    (marker,) = recording.markers
+    assert (marker.text, marker.fields) == ('said "so" – µ', {"axis": "z", "depth_m": 0.1})
+    assert recording.cycles[0].duration_s == 0.4
+    assert (recording.gaps[0].missing, recording.notes[0].text) == (1, "seen")
+    assert recording.ticks["seq"].tolist() == list(range(TICKS))
+
+
+@examples(60)
+@given(st.data())
+def test_a_file_cut_at_any_byte_is_read_up_to_its_last_whole_chunk(
+    whole: tuple[Path, list[list[Sent]]], data: st.DataObject
+) -> None:
+    path, _ = whole
+    ends = boundaries(path)
+    near = st.sampled_from(ends).flatmap(lambda end: st.integers(end - 12, end + 12))
+    at = data.draw(st.one_of(st.integers(0, path.stat().st_size - 1), near, st.integers(0, ends[0])))
+    cut = path.with_name("cut.mcap")
+    cut.write_bytes(path.read_bytes()[:at])
+    kept = sum(end <= at for end in ends)
+    if kept == 0 and refusal(cut):
+        return
+    recording = read(cut)
+    ticks = recording.ticks.get("seq", [])
+    assert len(ticks) == min(kept * CHUNK_TICKS, TICKS)
+    # Its end is in the data section: a cut behind that only loses the index.
+    assert recording.complete == (at >= ends[-1] and not recording.cut)
+    mended = path.with_name("mended.mcap")
+    count, why = repair(cut, mended, overwrite=True)
+    assert why == recording.cut
+    with mended.open("rb") as file:
+        assert len(list(make_reader(file, validate_crcs=True).iter_messages())) == count
+    again = read(mended)
+    assert again.complete
+    assert again.receipts == recording.receipts
+    assert len(again.ticks.get("seq", [])) == len(ticks)
+
+
+@examples(60)
+@given(at=st.integers(0, 10**9), change=st.integers(1, 255))
+def test_a_wrong_bit_anywhere_gives_an_error_or_what_is_before_it(
+    whole: tuple[Path, list[list[Sent]]], at: int, change: int
+) -> None:
+    path, written = whole
+    damaged = bytearray(path.read_bytes())
+    damaged[at % len(damaged)] ^= change
+    place = path.with_name("damaged.mcap")
+    place.write_bytes(damaged)
+    error = refusal(place)
+    if error:
+        assert error.startswith(str(place))
+        return
+    found = read(place).topics.get("position", {"seq": [], "position_m": []})
+    for seq, position_m in zip(found["seq"], found["position_m"], strict=True):
+        assert tuple(position_m) == written[int(seq)][0].position_m  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("junk", [b"", b"\x89MCAP0\r", b"\x89MCAP0\r\n", b"no recording" * 100, bytes(5000)])
+def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path, junk: bytes) -> None:
+    (tmp_path / "junk.mcap").write_bytes(junk)
+    with pytest.raises(HapticdError, match=r"is no|has no receipt"):
+        read(tmp_path / "junk.mcap")
+
+
+def test_a_file_that_is_there_stays(tmp_path: Path) -> None:
+    (tmp_path / "there.mcap").write_text("mine")
+    with pytest.raises(ConfigError, match="add --overwrite"):
+        RecordingFile(tmp_path / "there.mcap")
+    make(tmp_path / "cut.mcap", 90, 40)
+    with pytest.raises(ConfigError, match="add --overwrite"):
+        repair(tmp_path / "cut.mcap", tmp_path / "there.mcap")
+    assert (tmp_path / "there.mcap").read_text() == "mine"
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ConfigError, match="is a pipe"):
+        RecordingFile(tmp_path / "pipe", overwrite=True)
+
+
+FILL = """
+import sys
+from pathlib import Path
+from tests.views.recording.made import files_up_to, make
+make(Path(sys.argv[1]), 3000, 40)
+"""
+
+
+@pytest.mark.parametrize("limit", [1, 5000, 60_000, 60_001, 61_111, 90_000])
+def test_a_full_disk_ends_the_file_behind_its_last_whole_chunk(tmp_path: Path, limit: int) -> None:
+    path = tmp_path / "full.mcap"
+    done = subprocess.run(
+        [*files_up_to(limit), sys.executable, "-c", FILL, str(path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert f"DiskError: {path}: File too large" in done.stderr
+    check_full(path, limit)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount")
+@pytest.mark.parametrize("kilobytes", [64, 200])
+def test_a_full_file_system_ends_the_file_behind_its_last_whole_chunk(tmp_path: Path, kilobytes: int) -> None:
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "none", tmp_path], check=True)
+    try:
+        path = tmp_path / "full.mcap"
+        with pytest.raises(DiskError, match="No space left"):
+            make(path, 3000, 40)
+        check_full(path, kilobytes * 1024)
+    finally:
+        subprocess.run(["umount", tmp_path], check=True)
+
+
+def refusal(path: Path) -> str:
+    """Why a file cannot be read; "" when it can."""
+    try:
+        read(path)
+    except HapticdError as error:
+        return str(error)
+    return ""
+
+
+def check_full(path: Path, limit: int) -> None:
+    """The file ends properly, and has all chunks that had room but for the one that made room for the end."""
+    assert path.stat().st_size <= limit
+    if limit == 1:
+        assert path.stat().st_size == 0
+        return
+    with path.open("rb") as file:
+        count = len(list(StreamReader(file, validate_crcs=True).records))
+    if limit == 5000:
+        assert count == 3, "header, end, footer"
+        return
+    recording = read(path)
+    assert recording.complete
+    assert count >= 4 * len(recording.ticks["seq"])
+    size_of_chunk = 20_000
+    assert path.stat().st_size > limit - 2 * size_of_chunk
+    assert len(recording.ticks["seq"]) % 40 == 0
+    assert len(recording.ticks["seq"]) > 0

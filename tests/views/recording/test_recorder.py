@@ -1,0 +1,196 @@
+"""`hapticd record` beside a real daemon: stopped, killed, rotated, on a full disk, through a restart of the daemon."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+import hapticd
+from hapticd.client import Client, Position
+from hapticd_views.recording import read
+from hapticd_views.recording.scan import Scan
+from tests.daemon.running import HAPTICD, Daemon
+from tests.views.recording.made import Recording, files_up_to
+
+CONFIG = """
+# a comment is part of the configuration
+[loop]
+realtime = "off"
+[device]
+driver = "loopback"
+[device.options]
+model = "omega7"
+initial_position_m = 0.001
+[device.options.hand]
+force = { profile = "constant", newton = -3.0 }
+[[scene.walls]]
+axis = "z"
+free_side = "positive"
+stiffness_n_per_m = 12000.0
+[controller]
+law = "none"
+"""
+
+
+@pytest.fixture(scope="module")
+def daemon() -> Iterator[Daemon]:
+    with Daemon(CONFIG) as running:
+        yield running.wait_ready()
+
+
+@pytest.fixture(scope="module")
+def runtime(daemon: Daemon) -> dict[str, str]:
+    return {"HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
+
+
+def test_every_tick_marker_and_the_receipt_are_in_it(
+    daemon: Daemon, runtime: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Recording(tmp_path / "a.mcap", "--json", environment=runtime) as recording:
+        recording.has(20_000)
+        with Client(daemon.endpoint, topics=[Position]) as witness:
+            seen = [one for _ in range(10) for one in witness.receive(30.0) if isinstance(one, Position)]
+        monkeypatch.setenv("HAPTICD_RUNTIME_DIR", runtime["HAPTICD_RUNTIME_DIR"])
+        with hapticd.connect() as client:
+            client.mark("now")
+        recording.has(recording.output.stat().st_size + 100_000)
+        code, output, errors = recording.end(signal.SIGTERM)
+    assert (code, errors) == (0, "")
+    told = json.loads(output)
+    made = read(tmp_path / "a.mcap")
+    assert made.complete
+    assert (told["ticks"], told["missing"]) == (len(made.topics["position"]["seq"]), made.missing)
+    rows = {seq: row for row, seq in enumerate(made.ticks["seq"].tolist())}
+    assert len(seen) > 50
+    for tick in seen:
+        row = rows[tick.seq]
+        assert tuple(made.ticks["position_m"][row]) == tick.position_m
+        assert tuple(made.ticks["force_requested_n"][row]) == tick.force_requested_n
+        assert made.ticks["timestamp"][row] == tick.timestamp
+    assert [marker.text for marker in made.markers] == ["now"]
+    assert made.receipt["config_text"] == CONFIG
+    assert made.config.hash == made.receipt["config_hash"]
+    assert made.receipt["realtime"] is False
+    assert made.receipt["kernel"].split()[1] == os.uname().release
+    assert made.receipt["version"] == made.receipt["recorder_version"] == hapticd.__version__
+    # Along the wall: in contact the force is the wall's own, k times the depth.
+    wall = made.wall()
+    inside = wall["in_contact"] & (np.abs(wall["force_n"]) > 0.0)
+    assert inside.any()
+    assert np.array_equal(wall["force_requested_n"][inside], -12000.0 * wall["x_m"][inside])
+
+
+def test_a_kill_costs_half_a_second_at_most(daemon: Daemon, runtime: dict[str, str], tmp_path: Path) -> None:
+    with (
+        Client(daemon.endpoint, topics=[Position]) as witness,
+        Recording(tmp_path / "killed.mcap", environment=runtime) as recording,
+    ):
+        recording.has(150_000)
+        while witness.receive(0.0):
+            pass
+        newest = witness.receive(30.0)[-1]
+        assert isinstance(newest, Position)
+        recording.process.kill()
+        recording.process.wait()
+    made = read(tmp_path / "killed.mcap")
+    assert not made.complete
+    # What the witness has heard may not have reached the recorder yet: a message holds 20 ms of ticks.
+    assert made.ticks["timestamp"][-1] > newest.timestamp - 0.5
+    for name in ("position", "energy", "damping", "timing"):
+        assert set(np.diff(made.topics[name]["seq"]).tolist()) == {1} or made.gaps
+    spans = []
+    for piece in Scan(tmp_path / "killed.mcap").pieces():
+        times = [record.log_time for record in piece if hasattr(record, "log_time")] if isinstance(piece, list) else []
+        spans += [(max(times) - min(times)) * 1e-9] if times else []
+    assert max(spans) < 0.5
+    done = hapticd_record("show", tmp_path / "killed.mcap")
+    assert "the file ends early" in done.stdout
+    assert hapticd_record("repair", tmp_path / "killed.mcap", "--output", tmp_path / "whole.mcap").returncode == 0
+    assert read(tmp_path / "whole.mcap").complete
+    with (tmp_path / "whole.mcap").open("rb") as file:
+        assert sum(1 for _ in make_reader(file, validate_crcs=True).iter_messages(topics="hapticd/position")) == len(
+            made.topics["position"]["seq"]
+        )
+
+
+def test_files_follow_each_other_without_a_lost_tick(runtime: dict[str, str], tmp_path: Path) -> None:
+    arguments = ("--max-size", "0.1", "--topics", "position,timing", "--duration", "3")
+    with Recording(tmp_path / "long.mcap", *arguments, environment=runtime) as recording:
+        code, output, _ = recording.ended()
+    assert code == 0
+    files = sorted(tmp_path.iterdir())
+    assert [file.name for file in files[:2]] == ["long-001.mcap", "long-002.mcap"]
+    assert f"long-001.mcap to {files[-1].name}: " in output
+    made = [read(file) for file in files]
+    assert all(one.complete and one.receipt["config_text"] == CONFIG for one in made)
+    assert all(set(one.topics) <= {"position", "timing", "status", "event"} for one in made)
+    ticks = [seq for one in made for seq in one.ticks["seq"].tolist()]
+    missing = sum(one.missing for one in made)
+    assert ticks[-1] - ticks[0] + 1 == len(ticks) + missing
+
+
+def test_a_full_disk_is_one_line_and_a_readable_file(runtime: dict[str, str], tmp_path: Path) -> None:
+    with Recording(tmp_path / "full.mcap", environment=runtime, prefix=files_up_to(120_000)) as recording:
+        code, output, errors = recording.ended()
+    assert (code, output) == (1, "")
+    assert errors.splitlines() == [
+        f"hapticd: {tmp_path}/full.mcap: File too large: the recording ends here and is readable; make room, or name "
+        "another --output"
+    ]
+    made = read(tmp_path / "full.mcap")
+    assert made.complete
+    assert len(made.ticks["seq"]) > 100
+
+
+def test_recording_goes_on_through_a_restart_of_the_daemon(tmp_path: Path) -> None:
+    with Daemon(CONFIG) as first:
+        first.wait_ready()
+        place = {"HAPTICD_RUNTIME_DIR": str(first.directory / "run")}
+        with Recording(tmp_path / "two.mcap", environment=place) as recording:
+            recording.has(100_000)
+            first.process.send_signal(signal.SIGTERM)
+            first.process.wait()
+            first.config.write_text(CONFIG.replace("12000.0", "11000.0"))
+            environment = {**os.environ, **place, "HAPTICD_STATE_DIR": str(first.directory / "state")}
+            second = subprocess.Popen(
+                [HAPTICD, "run", "--config", str(first.config)], env=environment, stderr=subprocess.DEVNULL
+            )
+            try:
+                with Client(first.endpoint, topics=[Position], timeout_s=60.0) as witness:
+                    witness.wait_for(Position, lambda one: one.seq > 1000, timeout_s=60.0)
+                code, output, _ = recording.end()
+            finally:
+                second.terminate()
+                second.wait()
+    assert code == 0
+    assert "the daemon was started anew 1 times" in output
+    made = read(tmp_path / "two.mcap")
+    assert [note.restart for note in made.notes] == [True, False]
+    assert [one["wall_stiffness_n_per_m"] for one in made.receipts] == [[12000.0], [11000.0]]
+    assert {int(run) for run in made.ticks["run"]} == {0, 1}
+    assert 105 in [event.code for event in made.events], "it was told of the end of the first one"
+    again = made.ticks["run"] == 1
+    assert made.ticks["seq"][again][0] < made.ticks["seq"][~again][-1] or not made.ticks["seq"][again][0]
+
+
+def test_it_needs_a_daemon_and_a_place(runtime: dict[str, str], tmp_path: Path) -> None:
+    with Recording(tmp_path / "a.mcap", environment={"HAPTICD_RUNTIME_DIR": str(tmp_path)}) as recording:
+        code, _, errors = recording.ended()
+    assert code == 1
+    assert "no daemon answers; start it with `hapticd run`" in errors
+    assert len(errors.splitlines()) == 1
+    with Recording(tmp_path / "no" / "a.mcap", environment=runtime) as recording:
+        code, _, errors = recording.ended()
+    assert (code, errors) == (2, f"hapticd: {tmp_path}/no/a.mcap: there is no directory {tmp_path}/no\n")
+
+
+def hapticd_record(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([HAPTICD, "record", *arguments], capture_output=True, text=True, check=False)
