@@ -191,7 +191,7 @@ def _day(day: LongRun) -> Line:
     text = (
         f"{day.ticks:.4g} ticks, {day.hand}: sums to {worst:.1g}; {day.cycles_at_first} cycles in the first tenth, "
         f"{day.cycles_at_last} in the last; then on a stiffer wall {day.kept_outcome.words} with the "
-        f"{day.damping_n_s_per_m:.3g} N s/m of that day ({day.kept_n_s_per_m:.3g} at the end), and after these were set "
-        f"to 0 {day.outcome.words} with {day.adapted_n_s_per_m:.3g}"
+        f"{day.damping_n_s_per_m:.3g} N s/m of that day ({day.kept_n_s_per_m:.3g} at the end), and after these were "
+        f"set to 0 {day.outcome.words} with {day.adapted_n_s_per_m:.3g}"
     )
     return Line("a day", text, day.holds)
