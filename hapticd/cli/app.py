@@ -1,7 +1,7 @@
 """The overview of all commands; the module of one of them is imported only when that one is wanted.
 
 Commands of other distributions, and the studies and benchmarks of this one, are found through the entry-point group
-`hapticd.commands`: a name and the `typer.Typer` behind it.
+`hapticd.commands`: a name, and behind it a `typer.Typer` for a group of commands or a function for one.
 """
 
 from __future__ import annotations
@@ -75,14 +75,22 @@ def application(wanted: str | None = None) -> typer.Typer:
             if wanted is None:
                 _list_installed(app, point)
             elif wanted == point.name:
-                app.add_typer(point.load(), name=point.name)
+                _add_installed(app, point)
     return app
+
+
+def _add_installed(app: typer.Typer, point: EntryPoint) -> None:
+    loaded = point.load()
+    if isinstance(loaded, typer.Typer):
+        app.add_typer(loaded, name=point.name)
+    else:
+        app.command(point.name)(loaded)
 
 
 def _list_installed(app: typer.Typer, point: EntryPoint) -> None:
     """List a command of another distribution; one that cannot be imported spoils no overview."""
     try:
-        app.add_typer(point.load(), name=point.name)
+        _add_installed(app, point)
     except Exception as error:  # noqa: BLE001 - a plug-in is anybody's code
         app.command(point.name, help=f"Cannot be used: {type(error).__name__}: {error}")(_listed)
 

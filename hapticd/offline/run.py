@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import math
 from array import array
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,11 +16,12 @@ from hapticd.config.models import Config
 from hapticd.errors import HapticdError
 from hapticd.offline.column import Column
 from hapticd.offline.outcome import Balance, Criterion, Outcome, balance
-from hapticd.offline.plot import draw, inline_image
 from hapticd.simulation.options import SimulationOptions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from hapticd.figures.curves import Curves
 
 
 class Row(NamedTuple):
@@ -208,13 +210,33 @@ class Run:
         )
         return lines
 
-    def plot(self) -> Figure:
-        """Position, force, energy with the ends of its cycles, and damping over time.
+    @property
+    def curves(self) -> Curves:
+        """The run as `hapticd.figures` draws it, to be drawn with others.
 
         Raises:
             HapticdError: matplotlib is not installed.
         """
-        return draw(self.columns, self._title, self.balance.x_m)
+        with _matplotlib_needed():
+            from hapticd.figures.curves import Curves
+
+            return Curves(self._title, self.columns, self.stiffness_n_per_m, self.balance.x_m)
+
+    def plot(self, figure: str = "run") -> Figure:
+        """A figure of this run.
+
+        Args:
+            figure: "run" (position, force, energy with the ends of its cycles, and damping), one of those alone,
+                "stiffness", "loop", or "fig9" after the paper's Fig. 9.
+
+        Raises:
+            ConfigError: there is no such figure.
+            HapticdError: matplotlib is not installed.
+        """
+        with _matplotlib_needed():
+            from hapticd.figures.sheets import draw
+
+            return draw(figure, [self.curves], self._title)
 
     def position_error_m(self, exact: Run) -> float:
         """Largest distance of the true position from another run [m]; infinite when this one ends early."""
@@ -234,7 +256,10 @@ class Run:
         """What a notebook shows: a small plot where matplotlib is installed, and the outcome."""
         text = html.escape("\n".join([self._title, *self.words]))
         try:
-            return f"{inline_image(self.plot())}<pre>{text}</pre>"
+            drawn = self.plot()
+            from hapticd.figures.picture import inline_image
+
+            return f"{inline_image(drawn, 'run')}<pre>{text}</pre>"
         except HapticdError:
             return f"<pre>{text}</pre>"
 
@@ -250,6 +275,14 @@ class Run:
         depth_m = -sum([x_m for x_m, touched in zip(self._last(name), inside, strict=True) if touched])
         force_n = sum([one_n for one_n, touched in zip(self._last("force_n"), inside, strict=True) if touched])
         return force_n / depth_m if depth_m > 0.0 else math.nan
+
+
+@contextlib.contextmanager
+def _matplotlib_needed() -> Iterator[None]:
+    try:
+        yield
+    except ModuleNotFoundError:
+        raise HapticdError("a plot needs matplotlib: pip install 'hapticd[study]'") from None
 
 
 def window_ticks(period_s: float) -> int:

@@ -158,9 +158,9 @@ def test_a_plot_shows_position_force_energy_and_damping_of_every_tick() -> None:
     ]
     lines = {line.get_label(): line for panel in panels for line in panel.lines}
     assert np.array_equal(lines["true"].get_ydata(), run.x_m * 1e3)
-    ends = np.flatnonzero(np.diff(run.cycle)) + 1
-    assert len(ends) > 2
-    assert np.array_equal(lines["end of a cycle"].get_xdata(), run.t_s[ends])
+    balance = np.asarray(lines["balance"].get_ydata())
+    assert balance == pytest.approx(run.balance.x_m * 1e3)
+    assert [axes.get_ylabel() for axes in run.plot("stiffness").axes] == ["displayed stiffness [kN/m]"]
 
 
 def test_a_notebook_shows_a_small_picture_and_the_outcome(settled: Run) -> None:

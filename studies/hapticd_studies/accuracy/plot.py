@@ -7,7 +7,8 @@ import math
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hapticd_studies import style
+from hapticd.figures import style
+from hapticd.figures.picture import encoded
 from hapticd_studies.accuracy.model import ModelRow, ModelStudy
 from hapticd_studies.accuracy.report import AccuracyReport
 
@@ -42,7 +43,7 @@ def draw(report: AccuracyReport) -> bytes:
         ]
         front = Line2D([], [], color=style.RED, linewidth=1.2, drawstyle="steps-post", label="Pareto front")
         figure.legend(handles=[*handles, front], loc="outside lower center", ncols=5)
-        return style.png(figure)
+        return encoded(figure, ".png")
 
 
 def _panel(panel: Axes, model: ModelStudy, title: str, errors: list[float]) -> None:

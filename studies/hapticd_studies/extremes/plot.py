@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from hapticd_studies import style
+from hapticd.figures import style
+from hapticd.figures.picture import encoded
 from hapticd_studies.extremes.case import draw as draw_place
 from hapticd_studies.extremes.report import ExtremesReport
 from hapticd_studies.extremes.sweep import BALANCE_SHARE
@@ -23,7 +24,7 @@ def draw(report: ExtremesReport) -> bytes:
         _map(axes[0][0], report)
         _books(axes[0][1], report)
         figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower left", ncols=5, markerscale=6.0)
-        return style.png(figure)
+        return encoded(figure, ".png")
 
 
 def _map(panel: Axes, report: ExtremesReport) -> None:

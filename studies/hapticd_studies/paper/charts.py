@@ -7,12 +7,12 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from hapticd.figures.style import figure as sheet
 from hapticd.offline.outcome import PRESSED, Criterion
 from hapticd_studies.paper.claims import HELD, OFF_COUNT, Evidence
 from hapticd_studies.paper.starts import HANDS_N, NATIVE_N_PER_M, NOISES_M, WINDOW_HANDS_N, WINDOW_READINGS
 from hapticd_studies.paper.style import BLUE, GREEN, GREY, INK, ORANGE, OUTCOMES, PURPLE, RED, WIDTH_IN
 from hapticd_studies.paper.window import window_shares
-from hapticd_studies.style import figure as sheet
 
 _COLOURS = (GREEN, BLUE, ORANGE)
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hapticd.figures import sheets
+from hapticd.figures.style import figure as sheet
+from hapticd.figures.style import shade_wall
 from hapticd_studies.paper.claims import HELD, OFF_COUNT, SHOWN_S, Evidence
 from hapticd_studies.paper.experiments import SMOOTHED_SAMPLES
 from hapticd_studies.paper.recording import Array, Recording
-from hapticd_studies.paper.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, WIDTH_IN, limits, shade_wall
-from hapticd_studies.style import figure as sheet
+from hapticd_studies.paper.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, WIDTH_IN, limits
 
 _MARK = {"marker": "v", "ls": "none", "ms": 4.0, "mec": "white", "mew": 0.4, "zorder": 5}
 
@@ -141,23 +144,9 @@ def uncontrolled(evidence: Evidence) -> Figure:
 
 def controlled(evidence: Evidence) -> Figure:
     """Fig. 9: position, energy, damping and force at 12, 18 and 20 kN/m."""
-    figure, grid = sheet(WIDTH_IN, 7.2, 4, 3, sharex=True, sharey="row")
-    for column, name in enumerate(HELD):
-        run = evidence.runs[name]
-        shown = run.t_s <= 0.5
-        _position(grid[0, column], run, shown)
-        grid[0, column].axhline(run.scenario.balance_m * 1e3, color=GREY, lw=0.8, ls="--")
-        grid[0, column].set_title(f"{run.scenario.stiffness_n_per_m * 1e-3:g} kN/m")
-        _energy(grid[1, column], run, shown)
-        ends = [end for end in run.cycle_ends(2) if shown[end]]
-        grid[1, column].plot(run.t_s[ends], run.energy_j[ends] * 1e3, color=PURPLE, label="cycle ends", **_MARK)
-        grid[1, column].axhline(0.0, color=GREY, lw=0.7)
-        _damping(grid[2, column], run, shown)
-        _force(grid[3, column], run, shown)
-        grid[3, column].set_xlabel("time [s]")
-    grid[1, 0].legend(loc="upper right")
-    _outer_labels(grid)
-    return figure
+    runs = [evidence.runs[name] for name in HELD]
+    named = [replace(run.curves, name=f"{run.scenario.stiffness_n_per_m * 1e-3:g} kN/m") for run in runs]
+    return sheets.controlled([curves.between(0.0, sheets.FIG9_S) for curves in named])
 
 
 def passivity_control(evidence: Evidence) -> Figure:
@@ -182,8 +171,6 @@ def passivity_control(evidence: Evidence) -> Figure:
         grid[3, column].set_xlabel("time [s]")
     for row in (0, 3):
         _same_height(grid[row])
-    for axes in grid[0, 1:]:
-        shade_wall(axes)
     _outer_labels(grid)
     return figure
 
@@ -267,7 +254,6 @@ def _same_height(row: Sequence[Axes]) -> None:
     spans = [axes.get_ylim() for axes in row]
     for axes in row:
         limits(axes, [value for span in spans for value in span], margin=0.0)
-        shade_wall(axes) if axes.get_ylabel().startswith("position") else None
 
 
 def _outer_labels(grid: Array, keep_x: bool = False) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hapticd.figures.picture import encoded
 from hapticd.offline.outcome import Criterion
 from hapticd.version import __version__
 from hapticd_studies.grid.output import as_json, write
@@ -20,7 +21,6 @@ from hapticd_studies.paper.report import report
 from hapticd_studies.paper.runs import Runs
 from hapticd_studies.paper.scenarios import SCENARIOS
 from hapticd_studies.paper.tables import tables
-from hapticd_studies.style import png
 
 LONG_RUNS = ("fig9-12-off", *HELD, "fig9-18-continuous", "fig9-20-continuous")
 """Watched for a bound on what they generate."""
@@ -83,7 +83,7 @@ def publish(evidence: Evidence, folder: Path, dots_per_inch: int, command: str, 
     with style.look(dots_per_inch):
         for plate in PLATES:
             progress(f"drawing {plate.name}", 0.0)
-            pictures[plate.name] = png(plate.draw(evidence))
+            pictures[plate.name] = encoded(plate.draw(evidence), ".png")
             write(folder / f"{plate.name}.png", pictures[plate.name])
             progress(f"drawing {plate.name}", 0.2 / len(PLATES))
     made = f"hapticd {__version__}, Python {platform.python_version()}, {len(evidence.shares.drops_m)} starts a share."

@@ -1,4 +1,4 @@
-"""What these figures have beyond the style of all studies: walls are shaded, and each verdict has a colour."""
+"""What these figures have beyond the style of all: a smaller hand, and a colour for each verdict."""
 
 from __future__ import annotations
 
@@ -11,13 +11,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 
-from hapticd_studies import style
+from hapticd.figures import style
 
-BLUE, ORANGE, RED, GREY, INK = style.BLUE, style.ORANGE, style.RED, style.SERIES[5], style.INK
+BLUE, ORANGE, RED, GREY, INK = style.BLUE, style.ORANGE, style.RED, style.SLATE, style.INK
 GREEN, PURPLE = style.SERIES[2], style.SERIES[3]
-WALL = "#ece7dd"
-"""What is inside a wall is shaded like this."""
-
 OUTCOMES = ListedColormap(["#dbe9df", style.SAND, "#df8250", "#7c1d1a"])
 """Settled, out of place, moving, diverged: light to dark, so that a print in grey keeps the order."""
 
@@ -43,15 +40,6 @@ def look(dots_per_inch: int) -> Iterator[None]:
     """Draw in this style."""
     with style.applied(), mpl.rc_context({**_MORE, "savefig.dpi": dots_per_inch}):
         yield
-
-
-def shade_wall(axes: Axes) -> None:
-    """Shade what is inside the wall, below zero; call it when the limits are final."""
-    low, high = axes.get_ylim()
-    if low < 0.0:
-        axes.axhspan(low, min(0.0, high), color=WALL, zorder=0, lw=0)
-        axes.axhline(0.0, color=GREY, lw=0.7, zorder=1)
-        axes.set_ylim(low, high)
 
 
 def limits(axes: Axes, values: Any, margin: float = 0.08) -> None:

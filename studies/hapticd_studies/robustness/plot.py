@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from hapticd.figures import style
+from hapticd.figures.picture import encoded
 from hapticd.offline.outcome import Outcome
-from hapticd_studies import style
 from hapticd_studies.robustness.devices import WITHIN_REACH
 from hapticd_studies.robustness.readings import PAPER, short
 from hapticd_studies.robustness.report import RobustnessReport
@@ -30,7 +31,7 @@ def draw(report: RobustnessReport) -> bytes:
         if not paper:
             alone, axes = style.figure(7.0, height_in)
             _failures(axes[0][0], report)
-            return style.png(alone)
+            return encoded(alone, ".png")
         figure = style.blank(10.5, max(6.4, height_in))
         grid = figure.add_gridspec(2, 2, width_ratios=(1.05, 1.0))
         _failures(figure.add_subplot(grid[:, 0]), report)
@@ -41,7 +42,7 @@ def draw(report: RobustnessReport) -> bytes:
             for label, colour, marker, _ in _GROUPS
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
-        return style.png(figure)
+        return encoded(figure, ".png")
 
 
 def draw_one(title: str, time_s: Any, runs: Sequence[tuple[str, Any, Any]], target_m: float) -> bytes:
@@ -66,7 +67,7 @@ def draw_one(title: str, time_s: Any, runs: Sequence[tuple[str, Any, Any]], targ
         below.set_xlabel("Time [s]")
         above.set_title(title, loc="left")
         figure.legend(*above.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-        return style.png(figure)
+        return encoded(figure, ".png")
 
 
 def _failures(panel: Axes, report: RobustnessReport) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hapticd_studies import style
+from hapticd.figures import style
+from hapticd.figures.picture import encoded
 from hapticd_studies.transparency.report import TransparencyReport
 from hapticd_studies.transparency.summary import LawSummary
 
@@ -41,7 +42,7 @@ def draw(report: TransparencyReport) -> bytes:
             for label, (_, colour, marker, _) in zip(_LEGEND, _GROUPS, strict=True)
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
-        return style.png(figure)
+        return encoded(figure, ".png")
 
 
 def draw_one(title: str, time_s: Any, runs: Sequence[tuple[str, Any, Any]]) -> bytes:
@@ -64,7 +65,7 @@ def draw_one(title: str, time_s: Any, runs: Sequence[tuple[str, Any, Any]]) -> b
         below.set_xlabel("Time [s]")
         above.set_title(title, loc="left")
         figure.legend(*below.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-        return style.png(figure)
+        return encoded(figure, ".png")
 
 
 def _dots(

@@ -12,8 +12,9 @@ from matplotlib.colors import BoundaryNorm, Colormap, LinearSegmentedColormap, L
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hapticd.figures import style
+from hapticd.figures.picture import encoded
 from hapticd.offline.outcome import PRESSED, Outcome
-from hapticd_studies import style
 from hapticd_studies.zwidth.curves import Curve
 from hapticd_studies.zwidth.plane import MapAxis
 from hapticd_studies.zwidth.sweep import ZwidthPlan
@@ -78,7 +79,7 @@ def _draw_cells(plan: ZwidthPlan, tables: Sequence[np.ndarray[Any, Any]], found:
             if outcome in seen
         ]
     figure.legend(handles=[*patches, *_curve_handles(found)], loc="outside lower center", ncols=2 if columns < 3 else 3)
-    return style.png(figure)
+    return encoded(figure, ".png")
 
 
 def _draw_edges(plan: ZwidthPlan, tables: Sequence[np.ndarray[Any, Any]], found: Sequence[Curve]) -> bytes:
@@ -99,7 +100,7 @@ def _draw_edges(plan: ZwidthPlan, tables: Sequence[np.ndarray[Any, Any]], found:
     panel.set_ylabel(plan.y.quantity.axis_label)
     panel.set_title("Edge of what settles; along the border there is none in this range", loc="left")
     figure.legend(handles=[*handles, *_curve_handles(found)], loc="outside lower center", ncols=2)
-    return style.png(figure)
+    return encoded(figure, ".png")
 
 
 def edge_middles(axis: MapAxis, table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

@@ -1,29 +1,36 @@
-"""How the figures of the studies look: one hand, units at the axes, legible in print and without colour."""
+"""How every figure looks: one hand, units at the axes, legible in print and to the colour-blind."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 INK = "#1b1f24"
 GRID = "#d9dde2"
-BLUE = "#2f6f9f"
-ORANGE = "#d9822b"
+BLUE = "#1f5f99"
+ORANGE = "#e69f00"
 SAND = "#e9c46a"
 PALE = "#eceff2"
 GREY = "#a7afb8"
+SLATE = "#6b7684"
 RED = "#c8372d"
+WALL = "#ece7dd"
+"""What is inside a wall is shaded like this."""
 
-SERIES = ("#2f6f9f", "#d9822b", "#4d8f5b", "#8c5aa8", "#b5483f", "#6b7684")
-"""For curves, in this order; they differ in lightness as well."""
+SERIES = (BLUE, ORANGE, "#0a9273", "#c887b0", "#8a2f1b", "#62b5e5")
+"""For curves, in this order; told apart with any colour vision."""
+
+_DEEP = 1e5  # below any limit of an axis in mm
 
 RC: Any = {
     "font.family": "DejaVu Sans",
@@ -57,6 +64,13 @@ def applied() -> AbstractContextManager[None]:
     return mpl.rc_context(RC)
 
 
+def shade_wall(axes: Axes) -> None:
+    """Shade what is inside the wall, below zero, whatever limits the axes come to have."""
+    across = axes.get_yaxis_transform()
+    axes.add_artist(Rectangle((0.0, -_DEEP), 1.0, _DEEP, transform=across, color=WALL, zorder=0, lw=0))
+    axes.add_artist(Line2D([0.0, 1.0], [0.0, 0.0], transform=across, color=SLATE, lw=0.7, zorder=1))
+
+
 def blank(width_in: float, height_in: float) -> Figure:
     """A figure without axes, and without a window."""
     drawn = Figure(figsize=(width_in, height_in), layout="constrained")
@@ -75,10 +89,3 @@ def plain_ticks(axis: Axis, steps: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
     axis.set_major_locator(LogLocator(subs=steps))
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
-
-
-def png(drawn: Figure) -> bytes:
-    """The figure as a file; the same figure gives the same bytes."""
-    picture = io.BytesIO()
-    drawn.savefig(picture, format="png", metadata={"Software": None})
-    return picture.getvalue()
