@@ -5,9 +5,12 @@ A rename puts a file over anything: as root, over /dev/null, and then nothing on
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import stat
 from pathlib import Path
+
+from hapticd.errors import HapticdError
 
 _KINDS = {
     stat.S_IFDIR: "a directory",
@@ -46,3 +49,20 @@ def put(finished: Path, path: Path) -> None:
     if reason:
         raise OSError(errno.EINVAL, reason, str(path))
     finished.rename(path)
+
+
+def write(path: Path, content: bytes) -> None:
+    """Put a file in its place at once, so that an interruption leaves no half of it. A link stays a link.
+
+    Raises:
+        HapticdError: it cannot be written.
+    """
+    path = path.resolve()
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_bytes(content)
+        put(part, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise HapticdError(f"{path}: cannot be written: {error.strerror}") from None

@@ -9,7 +9,8 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from hapticd.errors import ConfigError, HapticdError
+from hapticd.errors import ConfigError
+from hapticd.replacing import write
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """What a file of a figure may end in."""
@@ -41,10 +42,7 @@ def save(figure: Figure, path: Path) -> None:
     """
     if path.suffix not in SUFFIXES:
         raise ConfigError(f"{path}: must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
-    try:
-        path.write_bytes(encoded(figure, path.suffix))
-    except OSError as error:
-        raise HapticdError(f"{path}: cannot be written: {error.strerror}") from None
+    write(path, encoded(figure, path.suffix))
 
 
 def inline_image(figure: Figure, name: str) -> str:

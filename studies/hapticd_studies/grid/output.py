@@ -13,8 +13,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from hapticd import replacing
 from hapticd.errors import ConfigError, HapticdError
-from hapticd.replacing import obstacle, put
+from hapticd.replacing import obstacle
 
 
 def require_extra(extra: str, *modules: str) -> None:
@@ -96,13 +97,7 @@ def require_file(file: Path) -> None:
 def write(file: Path, content: bytes) -> None:
     """Put a file in its place at once, so that an interruption leaves no half of it."""
     require_file(file)
-    file = file.resolve()  # a link stays a link
-    part = file.with_name(f".{file.name}.part")
-    try:
-        part.write_bytes(content)
-        put(part, file)
-    except OSError as error:
-        raise HapticdError(f"{file}: cannot be written: {error.strerror}") from None
+    replacing.write(file, content)
 
 
 def as_json(data: Any) -> bytes:
