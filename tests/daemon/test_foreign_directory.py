@@ -11,7 +11,7 @@ import pytest
 
 from tests.daemon.running import HAPTICD, Daemon
 
-SHADOWED = ("msgpack", "zmq", "typer", "pydantic", "hid", "serial", "usb", "watchfiles", "rich", "cobs", "tomlkit")
+SHADOWED = ("msgpack", "zmq", "typer", "pydantic", "hid", "serial", "usb", "rich", "cobs", "tomlkit")
 
 
 @pytest.fixture
