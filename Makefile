@@ -6,7 +6,9 @@ BIN := $(VENV)/bin
 # Stamps: what running needs is there; what tests need is there as well.
 READY_RUN := $(VENV)/.ready-run
 READY := $(VENV)/.ready
-PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
+# What hapticd itself needs comes in the versions that it was tested with, everywhere.
+CONSTRAINTS := constraints.txt
+PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint $(CONSTRAINTS) --editable
 
 # What tests and examples use besides Python; one list for this file, CI and the README.
 PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd-container debootstrap \
@@ -15,10 +17,14 @@ PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev syste
 # Where `make install` puts the program: a directory of its own, which `make uninstall` removes.
 PREFIX ?= /opt/hapticd
 DESTDIR ?=
+# Where units, rules, completions and the manual lie below: /usr for a package.
+SERVICE_PREFIX ?= /usr/local
+# What the service can do beyond the core, of little size.
+SERVICE_EXTRAS := metrics
 PLACE = $(DESTDIR)$(PREFIX)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint nightly bench packages clean install uninstall own-place
+.PHONY: help run test lint nightly bench packages clean install uninstall own-place deb
 
 help:
 	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
@@ -28,6 +34,7 @@ help:
 	@echo "make bench    how long a tick takes on this machine"
 	@echo "make install  the daemon as a system service (as root); PREFIX=$(PREFIX), DESTDIR for packages"
 	@echo "make uninstall  all of that away again, except configurations and fault records"
+	@echo "make deb      a package for this Debian, in dist"
 	@echo "make clean    remove the virtual environment and all that tools left"
 
 run: $(READY_RUN)
@@ -54,29 +61,35 @@ bench: $(READY)
 install: own-place
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || .ci/packages python3-venv
 	umask 022; $(PYTHON) -m venv "$(PLACE)"
-	umask 022; "$(PLACE)/bin/python" -P -m pip install --quiet --disable-pip-version-check --root-user-action ignore .
+	umask 022; "$(PLACE)/bin/python" -P -m pip install --quiet --disable-pip-version-check --root-user-action ignore \
+		--constraint $(CONSTRAINTS) '.[$(SERVICE_EXTRAS)]'
 	@# Below DESTDIR the environment must not remember where it was built.
 	@test -z "$(DESTDIR)" || { \
 		grep -rlIZ "$(PLACE)" "$(PLACE)/bin" "$(PLACE)/pyvenv.cfg" | xargs -0 -r sed -i "s|$(PLACE)|$(PREFIX)|g"; \
 		"$(PLACE)/bin/python" -m compileall -q -f -s "$(DESTDIR)" -p / "$(PLACE)/lib"; }
-	"$(PLACE)/bin/python" -P -m hapticd service install --root "$(DESTDIR)/"
+	"$(PLACE)/bin/python" -P -m hapticd service install --root "$(DESTDIR)/" --prefix "$(SERVICE_PREFIX)"
 
 # What is not there any more needs no removal.
 uninstall: own-place
-	test ! -x "$(PLACE)/bin/python" || "$(PLACE)/bin/python" -P -m hapticd service uninstall --root "$(DESTDIR)/"
+	test ! -x "$(PLACE)/bin/python" || "$(PLACE)/bin/python" -P -m hapticd service uninstall --root "$(DESTDIR)/" --prefix "$(SERVICE_PREFIX)"
 	rm -rf "$(PLACE)"
+
+deb:
+	deb/build
 
 own-place:
 	@case "$(PREFIX)" in /*/hapticd) ;; *) echo "PREFIX must be a directory of its own: /.../hapticd"; exit 1;; esac
+	@test "$(SERVICE_PREFIX)" = /usr -o ! -e "$(DESTDIR)/usr/lib/systemd/system/hapticd.service" \
+		|| { echo "hapticd is here as a package, which owns its files: apt install or apt remove hapticd"; exit 1; }
 
 packages:
 	@.ci/packages $(PACKAGES)
 
-$(READY_RUN): pyproject.toml | $(BIN)/python
+$(READY_RUN): pyproject.toml $(CONSTRAINTS) | $(BIN)/python
 	$(PIP_INSTALL) .
 	@touch $@
 
-$(READY): pyproject.toml | $(BIN)/python
+$(READY): pyproject.toml $(CONSTRAINTS) | $(BIN)/python
 	$(PIP_INSTALL) '.[dev]'
 	@touch $(READY_RUN) $@
 

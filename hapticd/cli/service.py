@@ -18,11 +18,16 @@ app = typer.Typer(
 )
 
 Root = Annotated[Path, typer.Option("--root", help="File system to fill, for a package or an image.")]
+Prefix = Annotated[
+    Path | None,
+    typer.Option("--prefix", help="What units, rules and manual lie below: /usr in a package, else /usr/local."),
+]
 
 
 @app.command()
 def install(
     root: Root = Path("/"),
+    prefix: Prefix = None,
     executable: Annotated[
         Path | None, typer.Option("--executable", help="The hapticd that the units run; this one when not given.")
     ] = None,
@@ -33,16 +38,16 @@ def install(
 
     Example: hapticd service install
     """
-    Installation(root, executable).install(typer.echo)
+    Installation(root, executable, prefix).install(typer.echo)
 
 
 @app.command()
-def uninstall(root: Root = Path("/")) -> None:
+def uninstall(root: Root = Path("/"), prefix: Prefix = None) -> None:
     """Stop the service and remove it, as root; configurations and fault records stay.
 
     Example: hapticd service uninstall
     """
-    Installation(root).uninstall(typer.echo)
+    Installation(root, prefix=prefix).uninstall(typer.echo)
 
 
 @app.command()

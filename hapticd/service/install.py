@@ -1,6 +1,6 @@
 """Set the service up on a computer: units, user, device rules, a first configuration; and take all but that away again.
 
-Everything goes where an administrator's own additions belong, /usr/local and /etc, so that it never meets a package.
+Everything goes where an administrator's own additions belong, /usr/local and /etc, or where a package's do, /usr.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 from hapticd.errors import HapticdError
@@ -24,8 +25,9 @@ KEPT: Final = ("/etc/hapticd", "/var/lib/hapticd")
 """What `uninstall` leaves: configurations and fault records."""
 
 _SHIPPED_EXECUTABLE = "/opt/hapticd/bin/hapticd"
-_LINK = Path("/usr/local/bin/hapticd")
-_LIBRARY = Path("/usr/local/lib")
+_OWN = Path("/usr/local")
+PACKAGE: Final = Path("/usr")
+"""The prefix of a package."""
 _CLOSED = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 """Where the unit's sandbox does not let the service look."""
 
@@ -43,12 +45,12 @@ class Installed:
 
     Attributes:
         path: where it belongs.
-        text: what it must say.
+        content: what it must hold.
         state: `installed`, `changed` or `missing`.
     """
 
     path: Path
-    text: str
+    content: bytes
     state: str
 
 
@@ -79,28 +81,44 @@ class Installation:
     Args:
         root: the file system; anything but / is only filled, for a package or an image.
         executable: the `hapticd` that the units run; the one of this interpreter by default.
+        prefix: what its directories lie below; where a package has put them, else /usr/local, by default.
+        shared: what else belongs below the prefix's `share`: the manual, completions.
     """
 
-    def __init__(self, root: Path = Path("/"), executable: Path | None = None) -> None:
+    def __init__(
+        self,
+        root: Path = Path("/"),
+        executable: Path | None = None,
+        prefix: Path | None = None,
+        shared: Mapping[str, bytes] = MappingProxyType({}),
+    ) -> None:
         self.root = root.absolute()
+        self.packaged = prefix != PACKAGE and self._at(PACKAGE / "lib/systemd/system" / UNITS[0]).exists()
+        self.prefix = PACKAGE if self.packaged else prefix or _OWN
+        self._library, self._link_path = self.prefix / "lib", self.prefix / "bin/hapticd"
+        self._shared = shared
         self.live = self.root == Path("/")
         self.executable = self._inside((executable or Path(sys.executable).with_name("hapticd")).absolute())
 
     def files(self) -> list[Installed]:
         """Every file of the service except its configuration."""
         units, rules = directory("systemd"), directory("drivers/udev")
+        library = self._library
         sources = {
-            **{_LIBRARY / "systemd/system" / unit: units / unit for unit in UNITS},
-            _LIBRARY / "sysusers.d/hapticd.conf": units / "hapticd.sysusers",
-            _LIBRARY / "tmpfiles.d/hapticd.conf": units / "hapticd.tmpfiles",
-            **{_LIBRARY / "udev/rules.d" / rule.name: rule for rule in sorted(rules.glob("*.rules"))},
+            **{library / "systemd/system" / unit: units / unit for unit in UNITS},
+            library / "sysusers.d/hapticd.conf": units / "hapticd.sysusers",
+            library / "tmpfiles.d/hapticd.conf": units / "hapticd.tmpfiles",
+            **{library / "udev/rules.d" / rule.name: rule for rule in sorted(rules.glob("*.rules"))},
+        }
+        contents = {
+            **{path: self._for_this_program(source) for path, source in sources.items()},
+            **{self.prefix / "share" / name: content for name, content in self._shared.items()},
         }
         found = []
-        for path, source in sources.items():
-            text = source.read_text().replace(_SHIPPED_EXECUTABLE, str(self.executable))
+        for path, content in contents.items():
             target = self._at(path)
-            state = "missing" if not target.exists() else "installed" if target.read_text() == text else "changed"
-            found.append(Installed(path, text, state))
+            state = "missing" if not target.exists() else "installed" if target.read_bytes() == content else "changed"
+            found.append(Installed(path, content, state))
         return found
 
     def install(self, say: Say) -> None:
@@ -109,16 +127,17 @@ class Installation:
         Raises:
             InstallationError: not allowed, or the service could not run from where hapticd is.
         """
+        self._refuse_packaged()
         obstacle = self._obstacle()
         if obstacle and self.live:
             raise InstallationError(obstacle)
         if obstacle:
             say(f"warning: {obstacle}")
         for file in self.files():
-            self._write(file.path, file.text)
+            self._write(file.path, file.content)
             say(str(file.path))
         if not self._at(SYSTEM_CONFIG).exists():
-            self._write(SYSTEM_CONFIG, (directory("config") / "hapticd.toml").read_text())
+            self._write(SYSTEM_CONFIG, (directory("config") / "hapticd.toml").read_bytes())
             say(str(SYSTEM_CONFIG))
         else:
             say(f"{SYSTEM_CONFIG} is kept as it is")
@@ -134,6 +153,7 @@ class Installation:
         Raises:
             InstallationError: not allowed.
         """
+        self._refuse_packaged()
         running = (
             [unit.name for unit in unit_states() if unit.active not in ("inactive", "failed")] if self.live else []
         )
@@ -155,9 +175,17 @@ class Installation:
 
     def _enabled(self) -> list[Path]:
         """The links by which systemd starts units of the service with the computer, also when a unit has gone."""
-        units = {str(_LIBRARY / "systemd/system" / unit) for unit in UNITS}
+        units = {str(self._library / "systemd/system" / unit) for unit in UNITS}
         links = self._at(Path("/etc/systemd/system")).glob("*.wants/hapticd*.service")
         return [link for link in links if link.is_symlink() and str(link.readlink()) in units]
+
+    def _refuse_packaged(self) -> None:
+        if self.packaged:
+            advice = "apt install or apt remove hapticd"
+            raise InstallationError(f"hapticd is here as a package, which owns its files: {advice}")
+
+    def _for_this_program(self, source: Path) -> bytes:
+        return source.read_text().replace(_SHIPPED_EXECUTABLE, str(self.executable)).encode()
 
     def _inside(self, path: Path) -> Path:
         """A path as the system in `root` will see it."""
@@ -182,7 +210,7 @@ class Installation:
                 )
         return "" if programs[0].exists() else f"{self.executable} is not there: install hapticd first"
 
-    def _write(self, path: Path, text: str) -> None:
+    def _write(self, path: Path, content: bytes) -> None:
         target = self._at(path)
         previous = os.umask(0o022)
         try:
@@ -190,7 +218,7 @@ class Installation:
             reason = obstacle(target)
             if reason:  # a link to /dev/null, for one, by which systemd masks a file
                 raise InstallationError(f"{target}: {reason}; remove it first")
-            target.write_text(text)
+            target.write_bytes(content)
             target.chmod(0o644)
         except OSError as error:
             raise _denied(target, error) from error
@@ -199,19 +227,19 @@ class Installation:
 
     def _link(self, say: Say) -> None:
         """Let a shell find the command, unless there is one of that name already."""
-        link = self._at(_LINK)
-        if self.executable == _LINK or link.is_symlink() or link.exists():
+        link = self._at(self._link_path)
+        if self.executable == self._link_path or link.is_symlink() or link.exists():
             return
         try:
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(self.executable)
         except OSError as error:
             raise _denied(link, error) from error
-        say(f"{_LINK} -> {self.executable}")
+        say(f"{self._link_path} -> {self.executable}")
 
     def _own_link(self) -> list[Path]:
-        link = self._at(_LINK)
-        return [_LINK] if link.is_symlink() and link.readlink() == self.executable else []
+        link = self._at(self._link_path)
+        return [self._link_path] if link.is_symlink() and link.readlink() == self.executable else []
 
     def _remove(self, path: Path) -> bool:
         """Remove a file, and the directories above it that are empty now and hold nothing of others."""
@@ -222,7 +250,7 @@ class Installation:
             return False
         except OSError as error:
             raise _denied(target, error) from error
-        common = {self._at(_LIBRARY), self._at(_LINK.parent)}
+        common = {self._at(self.prefix / name) for name in ("lib", "bin", "share")}
         for above in target.parents:
             if above in common or any(above.iterdir()):
                 break
@@ -232,8 +260,8 @@ class Installation:
     def _announce(self, gone: bool = False) -> None:
         """Make the running system take the files over."""
         if not gone:
-            _run("systemd-sysusers", str(_LIBRARY / "sysusers.d/hapticd.conf"))
-            _run("systemd-tmpfiles", "--create", str(_LIBRARY / "tmpfiles.d/hapticd.conf"))
+            _run("systemd-sysusers", str(self._library / "sysusers.d/hapticd.conf"))
+            _run("systemd-tmpfiles", "--create", str(self._library / "tmpfiles.d/hapticd.conf"))
         if Path("/run/udev/control").exists():
             _run("udevadm", "control", "--reload")
             _run("udevadm", "trigger", *(f"--subsystem-match={name}" for name in ("misc", "usb", "hidraw", "tty")))

@@ -244,8 +244,10 @@ def _debootstrap(place: Path, release: str, mirror: str) -> None:
 
 
 def _needed() -> list[str]:
+    """What `make install` takes from a package registry, in the versions that it names."""
     project = tomllib.loads((SOURCE / "pyproject.toml").read_text())
-    return [*project["project"]["dependencies"], *project["build-system"]["requires"]]
+    pinned = [line for line in (SOURCE / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
+    return [*pinned, *project["build-system"]["requires"]]
 
 
 def _download(place: Path, python: str, needed: list[str]) -> None:

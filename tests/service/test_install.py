@@ -67,6 +67,18 @@ def test_the_units_run_the_hapticd_that_installed_them(tmp_path: Path) -> None:
     assert "/opt/hapticd" not in unit
 
 
+def test_a_package_has_its_files_where_packages_have_them(tmp_path: Path) -> None:
+    installation = Installation(tmp_path, Path("/opt/hapticd/bin/hapticd"), Path("/usr"))
+    installation.install(silent)
+    assert files(tmp_path) == {name.replace("usr/local/", "usr/") for name in FILES}
+    found = Installation(tmp_path, Path("/opt/hapticd/bin/hapticd"))
+    assert {file.state for file in found.files()} == {"installed"}
+    for change in (found.install, found.uninstall):
+        with pytest.raises(InstallationError, match="as a package, which owns its files"):
+            change(silent)
+    assert files(tmp_path) == {name.replace("usr/local/", "usr/") for name in FILES}
+
+
 def test_a_configuration_is_never_overwritten(tmp_path: Path) -> None:
     installed(tmp_path)
     (tmp_path / CONFIG).write_text("# mine\n")
