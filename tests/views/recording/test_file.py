@@ -145,7 +145,7 @@ def test_a_wrong_bit_anywhere_gives_an_error_or_what_is_before_it(
         return
     found = read(place).topics.get("position", {"seq": [], "position_m": []})
     for seq, position_m in zip(found["seq"], found["position_m"], strict=True):
-        assert tuple(position_m) == written[int(seq)][0].position_m  # type: ignore[union-attr]
+        assert tuple(position_m) == written[int(seq)][0].position_m  # type: ignore[union-attr]  # a tick is a pair whose first is the position
 
 
 @pytest.mark.parametrize("junk", [b"", b"\x89MCAP0\r", b"\x89MCAP0\r\n", b"no recording" * 100, bytes(5000)])
