@@ -116,7 +116,7 @@ class Curves:
         return replace(self, columns={name: np.asarray(column)[chosen] for name, column in self.columns.items()})
 
     def from_contact(self) -> Curves:
-        """The same run with time counted from its first contact.
+        """The same run with time counted from where the wall is first met, or from the first tick if it is inside.
 
         Raises:
             HapticdError: it never touches its wall.
@@ -125,7 +125,9 @@ class Curves:
         if not inside.any():
             raise HapticdError(f"{self.name}: never touches its wall")
         time_s = self["t_s"]
-        return replace(self, columns={**self.columns, "t_s": time_s - time_s[int(np.argmax(inside))]})
+        arrivals = np.flatnonzero(inside[1:] & ~inside[:-1]) + 1
+        first = int(arrivals[0]) if len(arrivals) else 0
+        return replace(self, columns={**self.columns, "t_s": time_s - time_s[first]})
 
 
 def _extremes(values: Array, stretch: int) -> npt.NDArray[np.int64]:

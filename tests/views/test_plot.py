@@ -1,0 +1,178 @@
+"""`hapticd plot`: the same figure of a run wherever it comes from, and one line where there is none."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticd
+from hapticd.errors import HapticdError
+from hapticd.offline.run import Run
+from hapticd_views.source import Source, open_source
+from tests.daemon.running import HAPTICD, Daemon
+from tests.views.recorded import write_recording
+
+CONFIG = Path(__file__).parent.parent.parent / "config"
+WALL = CONFIG / "wall-12-energy-cycle.toml"
+OTHER_SIDE = (
+    WALL.read_text().replace("stiffness_n_per_m = 12000.0", 'stiffness_n_per_m = 12000.0\nfree_side = "negative"')
+    + "\n"
+)
+
+
+def plot(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [HAPTICD, "plot", *arguments],
+        env={**os.environ, **environment}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return hapticd.simulate(WALL, 1.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, run: Run) -> Path:
+    """One run in every kind of file."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name in ("run.csv", "run.npz"):
+        command = [HAPTICD, "simulate", "--config", str(WALL), "--duration", "1", "--output", str(folder / name)]
+        subprocess.run(command, check=True, capture_output=True)
+    write_recording(folder / "run.mcap", run, WALL.read_text())
+    return folder
+
+
+def test_a_run_is_the_same_from_every_file(folder: Path, run: Run) -> None:
+    sources = [open_source(folder / name) for name in ("run.csv", "run.npz", "run.mcap")]
+    for source in sources:
+        (curves,) = source.curves
+        assert np.array_equal(curves["force_n"], run.force_n)
+        assert np.array_equal(curves["energy_j"], run.energy_j)
+        assert np.array_equal(curves.cycle_ends(), run.curves.cycle_ends())
+        measured = "x_m" if source.recording else "x_measured_m"
+        assert curves[measured] == pytest.approx(run.x_measured_m, abs=1e-15)
+        assert curves["t_s"] == pytest.approx(run.t_s, abs=1e-6)  # a timestamp is good for a quarter of a microsecond
+    recorded = sources[2].curves[0]
+    assert recorded.stiffness_n_per_m == 12e3
+    assert recorded.rest_m == pytest.approx(-3.0 / 12e3), "of a simulated hand it is known where it comes to rest"
+
+
+def test_a_wall_whose_free_side_is_negative_is_drawn_the_same_way_round(tmp_path: Path) -> None:
+    run = hapticd.simulate(OTHER_SIDE, 0.5)
+    (curves,) = open_source(write_recording(tmp_path / "other.mcap", run, OTHER_SIDE)).curves
+    assert curves["x_m"] == pytest.approx(run.x_measured_m, abs=1e-15)
+    assert curves["x_m"].min() < -2e-4
+    assert curves["force_n"].max() > 3.0
+
+
+def test_a_device_in_free_space_is_drawn_axis_by_axis(tmp_path: Path, run: Run) -> None:
+    free: dict[str, Any] = {"wall_axis": [], "wall_position_m": [], "wall_stiffness_n_per_m": []}
+    source = open_source(write_recording(tmp_path / "free.mcap", run, WALL.read_text(), receipt=free))
+    assert [curves.name for curves in source.curves] == ["free.mcap z"]
+    assert not source.curves[0].inside.any()
+
+
+def test_missing_ticks_are_missing(tmp_path: Path, run: Run) -> None:
+    gone = range(300, 340)
+    source: Source = open_source(write_recording(tmp_path / "gap.mcap", run, WALL.read_text(), left_out=gone))
+    time_s, drawn = source.curves[0].line("x_m")
+    assert len(source.curves[0]["t_s"]) == run.ticks - 40
+    assert time_s[np.isnan(drawn)].tolist() == pytest.approx([0.34])
+
+
+def test_the_command_draws_recorded_and_simulated_runs_over_each_other(folder: Path, tmp_path: Path) -> None:
+    output = tmp_path / "both.svg"
+    done = plot(folder / "run.mcap", folder / "run.csv", "--figure", "stiffness", "--contact", "-o", output)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"{output}: stiffness of run.mcap, run.csv\n"
+    assert output.read_text().startswith("<?xml")
+    again = plot(folder / "run.mcap", "-o", output)
+    assert (again.returncode, again.stderr.strip()) == (2, f"hapticd: {output}: exists; add --overwrite to replace it")
+    assert plot(folder / "run.mcap", "-o", output, "--overwrite", "--from", "0.1", "--to", "0.3").returncode == 0
+
+
+def test_a_running_daemon_is_drawn_as_it_goes(tmp_path: Path) -> None:
+    output = tmp_path / "live.pdf"
+    with Daemon((CONFIG / "hapticd.toml").read_text()).wait_ready() as daemon:
+        runtime = {"HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
+        done = plot("live", "--duration", "0.5", "--output", output, **runtime)
+        assert (done.returncode, done.stderr) == (0, "")
+    assert output.read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run.csv", "-o", "run.gif"], "run.gif: must end in .png, .svg or .pdf"),
+        (["run.csv", "-o", "run.png", "-f", "pie"], "--figure pie: there are run, position, force,"),
+        (["run.txt", "-o", "run.png"], "run.txt: must end in .mcap (hapticd record), or in .csv or .npz"),
+        (["run.csv", "-o", "none/run.png"], "none/run.png: there is no directory none"),
+        (["live", "live", "-o", "run.png"], "live: there is one daemon to listen to"),
+    ],
+)
+def test_what_is_asked_for_wrongly_is_said_in_one_line(
+    arguments: list[str], said: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments = [str(folder / one) if one == "run.csv" else one for one in arguments]
+    done = plot(*arguments)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"hapticd: {said}")
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("no.csv", None, "cannot be read: No such file"),
+        ("empty.csv", b"", "has no column t_s, x_m, force_n"),
+        ("header.csv", b"t_s,x_m,force_n\n", "holds no tick"),
+        ("words.csv", b"t_s,x_m,force_n\n0,1,two\n", "is no table of numbers"),
+        ("ragged.csv", b"t_s,x_m,force_n\n0,1\n", "has 3 names for 2 columns"),
+        ("binary.csv", bytes(range(256)), "is no table of numbers"),
+        ("other.csv", b"a,b\n1,2\n", "has no column t_s, x_m, force_n: it is no run of a device"),
+        ("no.npz", None, "cannot be read"),
+        ("words.npz", b"PK\x03\x04 and more", "is no .npz file"),
+        ("empty.npz", b"", "is no .npz file"),
+        ("words.mcap", b"no mcap", "words.mcap"),
+    ],
+)
+def test_a_file_that_holds_no_run_says_so(name: str, content: bytes | None, said: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(HapticdError) as error:
+        open_source(path)
+    assert said in str(error.value)
+    assert name in str(error.value)
+
+
+def test_a_pickle_in_a_file_of_columns_is_not_run(tmp_path: Path) -> None:
+    """An .npz from a stranger: numpy runs what a pickle says when it is allowed to."""
+    target = tmp_path / "done"
+
+    class Hostile:
+        def __reduce__(self) -> tuple[object, tuple[str, ...]]:
+            return (os.mkdir, (str(target),))
+
+    np.savez(tmp_path / "bad.npz", t_s=np.array([Hostile()], object), x_m=[0.0], force_n=[0.0])
+    with pytest.raises(HapticdError, match=r"is no \.npz file of numbers"):
+        open_source(tmp_path / "bad.npz")
+    assert not target.exists()
+
+
+def test_without_the_extras_the_command_says_what_to_install(tmp_path: Path) -> None:
+    hide = "import sys; sys.modules['matplotlib'] = None; from hapticd.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", hide, "plot", "run.csv", "-o", "run.png"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr == "hapticd: plots need matplotlib: pip install 'hapticd[study,record]'\n"

@@ -1,0 +1,151 @@
+"""What a plot or a report is made of: a recording, a file of `hapticd simulate`, or a daemon that is listened to."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hapticd.client import DaemonClient
+from hapticd.errors import ConfigError, HapticdError
+from hapticd.figures.curves import Curves
+from hapticd.offline.outcome import balance
+from hapticd.offline.rehearsal import simulation_options
+from hapticd.offline.run import Row
+from hapticd_views.recording import Recording, read
+from hapticd_views.recording.recorder import Limits, Recorder
+
+SUFFIXES = (".mcap", ".csv", ".npz")
+"""What a file may end in."""
+
+Columns = dict[str, npt.NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One run, wherever it comes from.
+
+    Attributes:
+        name: of the file, or "live".
+        curves: at the first wall; without a wall, one along each axis.
+        recording: what it was recorded in; None for a file of `hapticd simulate`.
+    """
+
+    name: str
+    curves: tuple[Curves, ...]
+    recording: Recording | None
+
+
+def open_source(path: Path) -> Source:
+    """The run in a file.
+
+    Raises:
+        ConfigError: nothing is known to be in a file of this name.
+        HapticdError: it cannot be read, or holds no run.
+    """
+    if path.suffix not in SUFFIXES:
+        raise ConfigError(f"{path}: must end in .mcap (hapticd record), or in .csv or .npz (hapticd simulate)")
+    if path.suffix == ".mcap":
+        return recorded(path.name, read(path))
+    columns = _csv(path) if path.suffix == ".csv" else _npz(path)
+    return Source(path.name, (Curves(path.name, columns),), None)
+
+
+def recorded(name: str, recording: Recording) -> Source:
+    """The run in a recording.
+
+    Args:
+        name: what it is called.
+        recording: that was read.
+
+    Raises:
+        HapticdError: it has no tick, or its configuration is needed and not in it.
+    """
+    ticks = recording.ticks
+    if "position_m" not in ticks or not len(ticks["timestamp"]):
+        raise HapticdError(f"{name}: holds no tick with a position")
+    if not recording.receipt["wall_axis"]:
+        return Source(name, _axes(name, recording), recording)
+    columns = recording.wall(0)
+    ended = sorted(cycle.timestamp for cycle in recording.cycles if cycle.contact == 0)
+    if "energy_j" in columns:
+        columns["cycle"] = np.searchsorted(ended, ticks["timestamp"], side="right")
+    stiffness = recording.receipt["wall_stiffness_n_per_m"][0]
+    return Source(name, (Curves(name, columns, stiffness, _rest_m(recording)),), recording)
+
+
+def listen(daemon: DaemonClient, duration_s: float, stopped: Callable[[], bool]) -> Source:
+    """What a daemon does for a while.
+
+    Args:
+        daemon: with the topics of every tick.
+        duration_s: how long [s].
+        stopped: asked whether to end before that.
+    """
+    with tempfile.TemporaryDirectory(prefix="hapticd-") as folder:
+        path = Path(folder) / "live.mcap"
+        Recorder(daemon, path, Limits()).run(stopped, duration_s)
+        return recorded("live", read(path))
+
+
+def _axes(name: str, recording: Recording) -> tuple[Curves, ...]:
+    """Free space: positions and forces as the device has them."""
+    ticks = recording.ticks
+    time_s = ticks["timestamp"] - ticks["timestamp"][0]
+    shared: Columns = {key: ticks[key] for key in ("energy_j", "late_us") if key in ticks}
+    outside = np.zeros(len(time_s), np.bool_)
+    return tuple(
+        Curves(
+            f"{name} {axis}",
+            {
+                **shared,
+                "t_s": time_s,
+                "x_m": ticks["position_m"][:, at],
+                "force_n": ticks["force_n"][:, at],
+                "force_requested_n": ticks["force_requested_n"][:, at],
+                "in_contact": outside,
+            },
+        )
+        for at, axis in enumerate(recording.receipt["axes"])
+    )
+
+
+def _rest_m(recording: Recording) -> float:
+    """Where hand and walls balance, which is known of a simulated hand only [m]."""
+    try:
+        config = recording.config
+        return balance(simulation_options(config), config.config.scene.walls).x_m
+    except HapticdError:
+        return math.nan
+
+
+def _csv(path: Path) -> Columns:
+    try:
+        with path.open(encoding="utf-8") as file:
+            names = file.readline().strip().split(",")
+            rows = file.read()
+        table = np.loadtxt(rows.splitlines(), delimiter=",", ndmin=2) if rows.strip() else np.empty((0, len(names)))
+    except OSError as error:
+        raise HapticdError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise HapticdError(f"{path}: is no table of numbers: {error}") from None
+    if table.shape[1] != len(names):
+        raise HapticdError(f"{path}: has {len(names)} names for {table.shape[1]} columns")
+    return {name: column for name, column in zip(names, table.T, strict=False) if name in Row._fields}
+
+
+def _npz(path: Path) -> Columns:
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
+            return {name: found[name] for name in found.files if name in Row._fields}
+    except OSError as error:
+        raise HapticdError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+        raise HapticdError(f"{path}: is no .npz file of numbers: {error}") from None
