@@ -18,6 +18,10 @@ from hapticd.keys.policy import stays_here, takes_keys
 from hapticd.keys.store import KeyDirectory
 from hapticd.paths import CONTROL, TELEMETRY
 
+LSL_PORTS = range(16572, 16605)
+"""Where liblsl offers streams, as it comes."""
+
+_LISTENS = "0A"  # in /proc/net/tcp
 _LONGEST_SOCKET = 107
 _ENOUGH = 500 * 2**20
 _TOO_LITTLE = 20 * 2**20
@@ -113,6 +117,26 @@ def keys(endpoints: Mapping[str, str], directory: KeyDirectory) -> Finding:
     return ok(f"open to these keys: {listed}; {' and '.join(reach)}")
 
 
+def streams(root: Path = ROOT) -> Finding:
+    """Whether Lab Streaming Layer, as `hapticd lsl` uses it, lets every computer read what is measured here.
+
+    Args:
+        root: the file system of /proc.
+
+    Raises:
+        OSError: this user may not look.
+    """
+    listening = sorted({port for port in _open_to_all(root) if port in LSL_PORTS})
+    if not listening:
+        return ok("no Lab Streaming Layer stream is open to other computers")
+    first, last = LSL_PORTS[0], LSL_PORTS[-1]
+    return advice(
+        f"Lab Streaming Layer listens on every address, unencrypted, port {', '.join(map(str, listening))}: whoever "
+        "reaches this computer can read its streams, and liblsl cannot be told otherwise",
+        f"sudo ss -ltnp 'sport >= :{first} and sport <= :{last}'  # whose; end it, or keep others out with a firewall",
+    )
+
+
 def state(directory: Path) -> Finding:
     """Whether the disk of the state directory has room for fault records.
 
@@ -152,6 +176,18 @@ def _taken(name: str, endpoint: str, port: int, error: OSError, process: int) ->
     if error.errno == errno.EACCES:
         return problem(f"{endpoint}: {error.strerror}", f"# in the configuration, {name}: a port of 1024 or more")
     return problem(f"{endpoint}: {error.strerror}", "ip address show  # an interface must have this address")
+
+
+def _open_to_all(root: Path) -> list[int]:
+    """Ports on which some program listens for every address."""
+    found = []
+    for table in ("tcp", "tcp6"):
+        for line in read_if_there(root / "proc/net" / table).splitlines()[1:]:
+            _, local, _, state, *_ = line.split()
+            address, _, port = local.rpartition(":")
+            if state == _LISTENS and not address.strip("0"):
+                found.append(int(port, 16))
+    return found
 
 
 def _nearest(directory: Path) -> Path:

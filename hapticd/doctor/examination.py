@@ -73,6 +73,7 @@ class Examination:
             Check("endpoints.runtime", "directory", lambda: endpoints.runtime(directory)),
             Check("endpoints.tcp", "endpoint", lambda: endpoints.tcp(self.wanted.tcp, _or_none(daemon))),
             Check("endpoints.keys", "keys", lambda: endpoints.keys(self.wanted.tcp, KeyDirectory(key_directory()))),
+            Check("endpoints.streams", "lab streams", lambda: endpoints.streams(root)),
             Check("endpoints.state", "disk", lambda: endpoints.state(faults)),
         ]
 

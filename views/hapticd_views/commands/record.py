@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ import typer
 
 from hapticd.errors import HapticdError
 from hapticd.paths import DEFAULT_INSTANCE
+from hapticd_views.commands.signals import stop_signals
 
 if TYPE_CHECKING:
     from hapticd_views.recording.recorder import Progress
@@ -78,7 +78,7 @@ def record(
     wanted: dict[str, Any] = {} if topics is None else {"topics": [*_split(topics), "status", "event"]}
     with (
         connected(instance, telemetry=connect, control=control, keys=keys, **wanted) as daemon,
-        _stop_signals() as stopped,
+        stop_signals() as stopped,
         _progress_line(path) as tell,
     ):
         done = Recorder(daemon, path, Limits(size_bytes, max_duration_s), overwrite).run(stopped, duration_s, tell)
@@ -137,21 +137,6 @@ def _extra() -> Iterator[None]:
 
 def _split(topics: list[str]) -> list[str]:
     return [one for given in topics for one in given.replace(",", " ").split()]
-
-
-@contextmanager
-def _stop_signals() -> Iterator[Callable[[], bool]]:
-    """Whether we were asked to end: then the file is ended properly, and not where the interrupt happened to come."""
-    asked: list[int] = []
-    before = {
-        number: signal.signal(number, lambda received, _frame: asked.append(received))
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    }
-    try:
-        yield lambda: bool(asked)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
