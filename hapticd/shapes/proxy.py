@@ -1,0 +1,274 @@
+"""The proxy: a point that stays on the surface while the device is inside, and pulls it back by a spring.
+
+It is traced along the device's way to where it meets the surface, slides as near to the device as it can, and stays on
+its side: edges, corners and thin plates hold (Ruspini, Kolarov and Khatib, SIGGRAPH 1997). It moves only where that
+brings it nearer to the device, which bounds what a tick can make of energy by k/2 |dp|^2. Friction holds it within a
+cone about the goal, where it would be without friction (Harwin and Melder, Eurohaptics 2002).
+
+The proxy is kept in the solid's own frame: it goes with a solid that moves. Scalars alone, so that the same source
+runs interpreted in the loop and compiled in studies.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+from hapticd.shapes.surface import SURFACE_M, distance, land, trace
+
+_LEAST_M2 = 1e-16
+_SLIDES = 10
+_SAME_SIDE = 0.9
+
+
+def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> None:
+    """Move the goal along the surface, as near to the device as it can come from where it is."""
+    share = 1.0
+    wx = px - proxy.gx
+    wy = py - proxy.gy
+    wz = pz - proxy.gz
+    ww = wx * wx + wy * wy + wz * wz
+    nx = proxy.ux
+    ny = proxy.uy
+    nz = proxy.uz
+    for _ in range(_SLIDES):
+        along = wx * nx + wy * ny + wz * nz
+        tx = share * (wx - along * nx)
+        ty = share * (wy - along * ny)
+        tz = share * (wz - along * nz)
+        if tx * tx + ty * ty + tz * tz < _LEAST_M2:
+            return
+        d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
+        vx = px - x
+        vy = py - y
+        vz = pz - z
+        vv = vx * vx + vy * vy + vz * vz
+        if vv < ww and -SURFACE_M <= d <= SURFACE_M:
+            gained = ww - vv
+            proxy.gx = x
+            proxy.gy = y
+            proxy.gz = z
+            proxy.ux = nx = mx
+            proxy.uy = ny = my
+            proxy.uz = nz = mz
+            wx = vx
+            wy = vy
+            wz = vz
+            ww = vv
+            share = 1.0
+            if gained < _LEAST_M2:
+                return
+        else:
+            tx = x - proxy.gx
+            ty = y - proxy.gy
+            tz = z - proxy.gz
+            if tx * tx + ty * ty + tz * tz < _LEAST_M2:  # an edge: it stays there, whichever face is asked
+                proxy.ux = mx
+                proxy.uy = my
+                proxy.uz = mz
+                return
+            share *= 0.5
+
+
+def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
+    """See where the device is now, and bring proxy and readings there.
+
+    Args:
+        proxy: the proxy.
+        others: the other shapes of its solid.
+        voxels: the distances of its fields.
+        x: the device in the world, with y and z [m].
+        y: see x.
+        z: see x.
+    """
+    x -= proxy.px
+    y -= proxy.py
+    z -= proxy.pz
+    if proxy.turned:
+        wx = x
+        wy = y
+        x = proxy.xx * wx + proxy.yx * wy + proxy.zx * z
+        y = proxy.xy * wx + proxy.yy * wy + proxy.zy * z
+        z = proxy.xz * wx + proxy.yz * wy + proxy.zz * z
+    if proxy.touching:
+        if proxy.exact:
+            d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
+            if proxy.ux * nx + proxy.uy * ny + proxy.uz * nz > _SAME_SIDE:
+                if d >= 0.0:
+                    release(proxy, x, y, z, d)
+                    return
+                proxy.gx = x - d * nx
+                proxy.gy = y - d * ny
+                proxy.gz = z - d * nz
+                proxy.ux = nx
+                proxy.uy = ny
+                proxy.uz = nz
+                proxy.depth_m = -d
+                if proxy.turned:
+                    turn_out(proxy, nx, ny, nz)
+                else:
+                    proxy.normal_x = nx
+                    proxy.normal_y = ny
+                    proxy.normal_z = nz
+                if proxy.rough:
+                    rub(proxy, others, voxels, x, y, z)
+                return
+        wx = x - proxy.gx
+        wy = y - proxy.gy
+        wz = z - proxy.gz
+        if wx * proxy.ux + wy * proxy.uy + wz * proxy.uz < 0.0:
+            slide(proxy, others, voxels, x, y, z)
+            wx = x - proxy.gx
+            wy = y - proxy.gy
+            wz = z - proxy.gz
+        if wx * proxy.ux + wy * proxy.uy + wz * proxy.uz >= 0.0:
+            hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, True)
+            if not hit:
+                d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
+                release(proxy, x, y, z, d)
+                return
+            meet(proxy, others, voxels, gx, gy, gz)
+            slide(proxy, others, voxels, x, y, z)
+    else:
+        d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
+        wx = x - proxy.gx
+        wy = y - proxy.gy
+        wz = z - proxy.gz
+        both = d + proxy.d
+        if d > 0.0 and wx * wx + wy * wy + wz * wz <= both * both:
+            proxy.gx = x
+            proxy.gy = y
+            proxy.gz = z
+            proxy.d = d
+            return
+        hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, False)
+        if not hit:
+            release(proxy, x, y, z, d)
+            return
+        proxy.touching = True
+        meet(proxy, others, voxels, gx, gy, gz)
+        proxy.sx = proxy.gx
+        proxy.sy = proxy.gy
+        proxy.sz = proxy.gz
+        slide(proxy, others, voxels, x, y, z)
+    read(proxy, x, y, z)
+    if proxy.rough:
+        rub(proxy, others, voxels, x, y, z)
+
+
+def place(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
+    """Begin at a point of the world: free, or on the surface nearest to it; what was before is forgotten."""
+    x -= proxy.px
+    y -= proxy.py
+    z -= proxy.pz
+    if proxy.turned:
+        wx = x
+        wy = y
+        x = proxy.xx * wx + proxy.yx * wy + proxy.zx * z
+        y = proxy.xy * wx + proxy.yy * wy + proxy.zy * z
+        z = proxy.xz * wx + proxy.yz * wy + proxy.zz * z
+    d, _, _, _ = distance(proxy, others, voxels, x, y, z)
+    release(proxy, x, y, z, d)
+    if d < 0.0:
+        proxy.touching = True
+        meet(proxy, others, voxels, x, y, z)
+        slide(proxy, others, voxels, x, y, z)
+        proxy.sx = proxy.gx
+        proxy.sy = proxy.gy
+        proxy.sz = proxy.gz
+        read(proxy, x, y, z)
+
+
+def release(proxy: Any, x: float, y: float, z: float, d: float) -> None:
+    """Be free where the device is."""
+    proxy.touching = False
+    proxy.sliding = False
+    proxy.gx = x
+    proxy.gy = y
+    proxy.gz = z
+    proxy.d = d
+    proxy.depth_m = 0.0
+    proxy.stretch_x = proxy.stretch_y = proxy.stretch_z = 0.0
+    proxy.lost_m2 = 0.0
+
+
+def meet(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
+    """Put the goal on the surface near a point."""
+    _, proxy.gx, proxy.gy, proxy.gz, proxy.ux, proxy.uy, proxy.uz = land(proxy, others, voxels, x, y, z)
+
+
+def read(proxy: Any, x: float, y: float, z: float) -> None:
+    """Depth and normal of the goal, seen from the device."""
+    wx = proxy.gx - x
+    wy = proxy.gy - y
+    wz = proxy.gz - z
+    proxy.depth_m = depth_m = sqrt(wx * wx + wy * wy + wz * wz)
+    if depth_m > 1e-12:
+        wx /= depth_m
+        wy /= depth_m
+        wz /= depth_m
+    else:
+        wx = proxy.ux
+        wy = proxy.uy
+        wz = proxy.uz
+    turn_out(proxy, wx, wy, wz)
+
+
+def turn_out(proxy: Any, x: float, y: float, z: float) -> None:
+    """Give out the normal in the world's frame."""
+    if proxy.turned:
+        proxy.normal_x = proxy.xx * x + proxy.xy * y + proxy.xz * z
+        proxy.normal_y = proxy.yx * x + proxy.yy * y + proxy.yz * z
+        proxy.normal_z = proxy.zx * x + proxy.zy * y + proxy.zz * z
+    else:
+        proxy.normal_x = x
+        proxy.normal_y = y
+        proxy.normal_z = z
+
+
+def rub(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> None:
+    """Hold the proxy within the cone of friction about its goal: it sticks, or slips to the cone's edge."""
+    proxy.lost_m2 = 0.0
+    ex = proxy.sx - proxy.gx
+    ey = proxy.sy - proxy.gy
+    ez = proxy.sz - proxy.gz
+    ee = ex * ex + ey * ey + ez * ez
+    friction = proxy.dynamic_friction if proxy.sliding else proxy.static_friction
+    free_m = friction * proxy.depth_m
+    if ee <= free_m * free_m:
+        proxy.sliding = False
+    else:
+        proxy.sliding = True
+        share = proxy.dynamic_friction * proxy.depth_m / sqrt(ee)
+        d, x, y, z, _, _, _ = land(
+            proxy, others, voxels, proxy.gx + share * ex, proxy.gy + share * ey, proxy.gz + share * ez
+        )
+        wx = proxy.sx - px
+        wy = proxy.sy - py
+        wz = proxy.sz - pz
+        ww = wx * wx + wy * wy + wz * wz
+        wx = x - px
+        wy = y - py
+        wz = z - pz
+        vv = wx * wx + wy * wy + wz * wz
+        if not (vv <= ww and -SURFACE_M <= d <= SURFACE_M):
+            x = proxy.gx
+            y = proxy.gy
+            z = proxy.gz
+            vv = proxy.depth_m * proxy.depth_m
+        if vv <= ww:
+            proxy.lost_m2 = 0.5 * (ww - vv)
+            proxy.sx = x
+            proxy.sy = y
+            proxy.sz = z
+            ex = x - proxy.gx
+            ey = y - proxy.gy
+            ez = z - proxy.gz
+    if proxy.turned:
+        proxy.stretch_x = proxy.xx * ex + proxy.xy * ey + proxy.xz * ez
+        proxy.stretch_y = proxy.yx * ex + proxy.yy * ey + proxy.yz * ez
+        proxy.stretch_z = proxy.zx * ex + proxy.zy * ey + proxy.zz * ez
+    else:
+        proxy.stretch_x = ex
+        proxy.stretch_y = ey
+        proxy.stretch_z = ez

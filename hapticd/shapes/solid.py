@@ -1,0 +1,262 @@
+"""Solids: rigid shapes at their places, and the proxy of each that the loop runs."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite, sqrt
+
+from hapticd.errors import ConfigError
+from hapticd.shapes.distance import BOX, CAPSULE, CYLINDER, FIELD, PLANE, SPHERE, shape_distance
+from hapticd.shapes.pose import Pose, Vector
+from hapticd.shapes.scalars import PART_KINDS, PROXY_KINDS, PartScalars, ProxyScalars, Scalar
+
+KINDS = {"plane": PLANE, "sphere": SPHERE, "box": BOX, "capsule": CAPSULE, "cylinder": CYLINDER, "mesh": FIELD}
+_NO_VOXELS = array("f")
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A shape at its place.
+
+    Attributes:
+        shape: one of `KINDS`.
+        pose: where it is. A plane is z = 0 of its own frame, solid below; a capsule and a cylinder lie along z.
+        inside: whether the device is kept inside, and the solid is all around.
+        radius_m: of a sphere, a capsule, a cylinder [m].
+        size_m: whole sides of a box [m].
+        length_m: of a cylinder from end to end; of a capsule between the centres of its ends [m].
+        rounding_m: radius of the edges of a box or a cylinder [m].
+
+    Raises:
+        ConfigError: a size that is missing, too small, or not the shape's.
+    """
+
+    shape: str
+    pose: Pose
+    inside: bool = False
+    radius_m: float = 0.0
+    size_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    length_m: float = 0.0
+    rounding_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.shape not in KINDS:
+            raise ConfigError(f'shape = "{self.shape}": is none of {", ".join(KINDS)}')
+        takes = {
+            "plane": (),
+            "sphere": ("radius_m",),
+            "box": ("size_m",),
+            "capsule": ("radius_m", "length_m"),
+            "cylinder": ("radius_m", "length_m"),
+            "mesh": (),
+        }[self.shape]
+        for name in ("radius_m", "size_m", "length_m"):
+            value = getattr(self, name)
+            values = value if isinstance(value, tuple) else (value,)
+            if name in takes and not all(0.0 < each < inf for each in values):
+                raise ConfigError(f"{name} = {value}: a {self.shape} must have a size above 0")
+            if name not in takes and any(each != 0.0 for each in values):
+                raise ConfigError(f"{name} = {value}: a {self.shape} has none")
+        if self.rounding_m != 0.0:
+            if self.shape not in ("box", "cylinder"):
+                raise ConfigError(f"rounding_m = {self.rounding_m}: a {self.shape} has no edges to round")
+            most = min(self.size_m) / 2.0 if self.shape == "box" else min(self.radius_m, self.length_m / 2.0)
+            if not 0.0 <= self.rounding_m <= most:
+                raise ConfigError(f"rounding_m = {self.rounding_m}: must be from 0 to {most:g}, half the least side")
+
+    def fields(self) -> dict[str, float | int | bool]:
+        """The scalars by which the arithmetic knows this shape, its pose not among them."""
+        r = self.rounding_m
+        a = b = c = 0.0
+        if self.shape == "box":
+            a, b, c = (side / 2.0 - r for side in self.size_m)
+        elif self.shape == "cylinder":
+            a, b = self.radius_m - r, self.length_m / 2.0 - r
+        elif self.shape == "capsule":
+            a, b = self.radius_m, self.length_m / 2.0
+        else:
+            a = self.radius_m
+        sign = -1.0 if self.inside else 1.0
+        return {"kind": KINDS[self.shape], "sign": sign, "a": a, "b": b, "c": c, "r": r}
+
+    def outer_m(self) -> float:
+        """Radius of the ball about its position that holds the shape [m]; endless for a plane."""
+        if self.shape == "plane":
+            return inf
+        if self.shape == "box":
+            x, y, z = self.size_m
+            return sqrt(x * x + y * y + z * z) / 2.0
+        if self.shape == "cylinder":
+            return sqrt(self.radius_m * self.radius_m + self.length_m * self.length_m / 4.0)
+        return self.radius_m + self.length_m / 2.0
+
+    def inner_m(self) -> float:
+        """Radius of the ball about its position that is in the shape all over [m]."""
+        if self.shape == "box":
+            return min(self.size_m) / 2.0
+        if self.shape == "cylinder":
+            return min(self.radius_m, self.length_m / 2.0)
+        return self.radius_m
+
+
+class Part(PartScalars):
+    """A shape in a union, for `hapticd.shapes.surface.distance`."""
+
+    __slots__ = tuple(PART_KINDS)
+
+    def __init__(self, placed: Placed, pose: Pose) -> None:
+        _fill(self, PART_KINDS, placed, pose)
+        self.bound_x, self.bound_y, self.bound_z = pose.position_m
+        outer_m = placed.outer_m()
+        self.bound_m = -1.0 if placed.inside or outer_m == inf else outer_m
+
+
+class Proxy(ProxyScalars):
+    """The proxy of one solid, for `hapticd.shapes.proxy.follow` and `place`.
+
+    Args:
+        shapes: the shapes of the solid; more than one are its union.
+        static_friction: coefficient while it sticks.
+        dynamic_friction: coefficient while it slips, at most the static one.
+        margin_m: how far the device can move in a tick [m].
+
+    Attributes:
+        others: the shapes after the first.
+        voxels: the distances of all fields.
+
+    Raises:
+        ConfigError: coefficients that are not possible.
+    """
+
+    __slots__ = (*PROXY_KINDS, "margin_m", "others", "shapes", "voxels")
+
+    def __init__(
+        self,
+        shapes: Sequence[Placed],
+        static_friction: float = 0.0,
+        dynamic_friction: float = 0.0,
+        margin_m: float = 0.005,
+    ) -> None:
+        if not (0.0 <= dynamic_friction <= static_friction and isfinite(static_friction)):
+            raise ConfigError(
+                f"dynamic_friction = {dynamic_friction}: must be from 0 to static_friction = {static_friction}"
+            )
+        first = shapes[0]
+        self.shapes = tuple(shapes)
+        self.margin_m = margin_m
+        _fill(self, PROXY_KINDS, first, first.pose)
+        self.others = tuple(Part(other, other.pose.seen_from(first.pose)) for other in shapes[1:])
+        self.voxels = _NO_VOXELS
+        self.first_part = 0
+        self.end_part = len(self.others)
+        self.exact = not self.others and first.shape != "mesh"
+        self.static_friction = static_friction
+        self.dynamic_friction = dynamic_friction
+        self.rough = static_friction > 0.0
+        self.uz = self.normal_z = 1.0
+        self._bound(first.pose)
+
+    def move(self, pose: Pose) -> Vector:
+        """Move the solid to another pose of its first shape; the way of the touched material point [m]."""
+        own = (self.sx, self.sy, self.sz) if self.rough else (self.gx, self.gy, self.gz)
+        before = _pose(self)
+        old = before.point(own)
+        device = before.point((self.gx, self.gy, self.gz))
+        _put(self, pose)
+        self._bound(pose)
+        if not self.touching:
+            self.gx, self.gy, self.gz = pose.own(device)
+            # The surface may have come nearer than it was.
+            self.d = 0.0
+            return 0.0, 0.0, 0.0
+        x, y, z = pose.point(own)
+        return x - old[0], y - old[1], z - old[2]
+
+    def _bound(self, pose: Pose) -> None:
+        """Set the half space or ball out of which nothing is touched."""
+        first = self.shapes[0]
+        x, y, z = pose.position_m
+        margin_m = self.margin_m
+        self.reach_x = self.reach_y = self.reach_z = self.reach_w = 0.0
+        self.reach_limit = inf
+        if first.shape == "plane" and not self.others:
+            sign = -1.0 if first.inside else 1.0
+            self.reach_x, self.reach_y, self.reach_z = (sign * each for each in pose.out((0.0, 0.0, 1.0)))
+            self.reach_limit = self.reach_x * x + self.reach_y * y + self.reach_z * z + margin_m
+        elif first.inside and not self.others:
+            inner_m = max(0.0, first.inner_m() - margin_m)
+            self.reach_x, self.reach_y, self.reach_z = 2.0 * x, 2.0 * y, 2.0 * z
+            self.reach_w = -1.0
+            self.reach_limit = (x * x + y * y + z * z) - inner_m * inner_m
+        else:
+            outer_m = first.outer_m()
+            for part, placed in zip(self.others, self.shapes[1:], strict=True):
+                far = sqrt(part.bound_x * part.bound_x + part.bound_y * part.bound_y + part.bound_z * part.bound_z)
+                outer_m = max(outer_m, inf if placed.inside else far + placed.outer_m())
+            if first.inside or outer_m == inf:
+                return
+            outer_m += margin_m
+            self.reach_x, self.reach_y, self.reach_z = -2.0 * x, -2.0 * y, -2.0 * z
+            self.reach_w = 1.0
+            self.reach_limit = outer_m * outer_m - (x * x + y * y + z * z)
+
+
+def group(shapes: Sequence[Placed], keys: Sequence[Hashable]) -> list[list[int]]:
+    """Which shapes make one solid: those of one key that overlap, straight or through others.
+
+    Args:
+        shapes: the shapes.
+        keys: one a shape; what two must have in common to be one solid.
+    """
+    groups: list[list[int]] = []
+    for at, shape in enumerate(shapes):
+        met = [each for each in groups if keys[each[0]] == keys[at] and any(_overlap(shape, shapes[i]) for i in each)]
+        groups = [each for each in groups if each not in met]
+        groups.append(sorted([at, *(i for each in met for i in each)]))
+    return sorted(groups)
+
+
+def _overlap(one: Placed, two: Placed) -> bool:
+    """Whether two solids may have a point in common; never false where they have."""
+    return not (_clear(one, two) or _clear(two, one))
+
+
+def _clear(one: Placed, two: Placed) -> bool:
+    """Whether the ball about one of them is off the other."""
+    outer_m = inf if one.inside else one.outer_m()
+    if outer_m == inf:
+        return False
+    part = Part(two, two.pose)
+    d, _, _, _ = shape_distance(part, _NO_VOXELS, *two.pose.own(one.pose.position_m))
+    return d >= outer_m
+
+
+def _fill(target: Part | Proxy, kinds: dict[str, Scalar], placed: Placed, pose: Pose) -> None:
+    for name, kind in kinds.items():
+        setattr(target, name, kind(0))
+    for name, value in placed.fields().items():
+        setattr(target, name, value)
+    _put(target, pose)
+
+
+def _put(target: Part | Proxy, pose: Pose) -> None:
+    target.px, target.py, target.pz = pose.position_m
+    target.turned = pose.turned
+    (
+        (target.xx, target.xy, target.xz),
+        (target.yx, target.yy, target.yz),
+        (target.zx, target.zy, target.zz),
+    ) = pose.rotation
+
+
+def _pose(target: Proxy) -> Pose:
+    return Pose(
+        (target.px, target.py, target.pz),
+        (
+            (target.xx, target.xy, target.xz),
+            (target.yx, target.yy, target.yz),
+            (target.zx, target.zy, target.zz),
+        ),
+    )

@@ -1,0 +1,108 @@
+"""The surface of a solid, which is one shape or the union of several: distance, landing on it, tracing to it."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+from hapticd.shapes.distance import shape_distance
+
+SURFACE_M = 1e-6
+"""A point this near is on the surface; what is left is corrected to first order."""
+
+_STEPS = 48
+_LANDINGS = 4
+
+
+def distance(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    """Distance and normal of a solid: of the nearest of its shapes, in the frame of the first one."""
+    d, nx, ny, nz = shape_distance(proxy, voxels, x, y, z)
+    for at in range(proxy.first_part, proxy.end_part):
+        part = others[at]
+        if part.bound_m >= 0.0:
+            bx = x - part.bound_x
+            by = y - part.bound_y
+            bz = z - part.bound_z
+            far = d + part.bound_m
+            if far < 0.0 or bx * bx + by * by + bz * bz >= far * far:
+                continue
+        bx = x - part.px
+        by = y - part.py
+        bz = z - part.pz
+        if part.turned:
+            qx = part.xx * bx + part.yx * by + part.zx * bz
+            qy = part.xy * bx + part.yy * by + part.zy * bz
+            qz = part.xz * bx + part.yz * by + part.zz * bz
+            e, qx, qy, qz = shape_distance(part, voxels, qx, qy, qz)
+            if e < d:
+                d = e
+                nx = part.xx * qx + part.xy * qy + part.xz * qz
+                ny = part.yx * qx + part.yy * qy + part.yz * qz
+                nz = part.zx * qx + part.zy * qy + part.zz * qz
+        else:
+            e, qx, qy, qz = shape_distance(part, voxels, bx, by, bz)
+            if e < d:
+                d = e
+                nx = qx
+                ny = qy
+                nz = qz
+    return d, nx, ny, nz
+
+
+def land(
+    proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """The surface near a point, by Newton's steps: distance left before the last one, point, normal."""
+    d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
+    x -= d * nx
+    y -= d * ny
+    z -= d * nz
+    tries = 0
+    while (d > SURFACE_M or d < -SURFACE_M) and tries < _LANDINGS:
+        tries += 1
+        if proxy.exact:
+            return 0.0, x, y, z, nx, ny, nz
+        d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
+        x -= d * nx
+        y -= d * ny
+        z -= d * nz
+    return d, x, y, z, nx, ny, nz
+
+
+def trace(
+    proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, px: float, py: float, pz: float, on: bool
+) -> tuple[bool, float, float, float]:
+    """Go from a point toward the device until the surface is met: whether it is, and where.
+
+    Args:
+        proxy: the proxy.
+        others: the other shapes of its solid.
+        voxels: the distances of its fields.
+        x: where to start, with y and z [m].
+        y: see x.
+        z: see x.
+        px: the device, with py and pz [m].
+        py: see px.
+        pz: see px.
+        on: whether the start is on the surface; then only the way ahead counts.
+    """
+    wx = px - x
+    wy = py - y
+    wz = pz - z
+    length = sqrt(wx * wx + wy * wy + wz * wz)
+    if length > 0.0:
+        wx /= length
+        wy /= length
+        wz /= length
+    gone = SURFACE_M if on else 0.0
+    for _ in range(_STEPS):
+        if gone >= length:
+            d, nx, ny, nz = distance(proxy, others, voxels, px, py, pz)
+            return d < 0.0, px, py, pz
+        d, nx, ny, nz = distance(proxy, others, voxels, x + gone * wx, y + gone * wy, z + gone * wz)
+        if d < SURFACE_M:
+            if wx * nx + wy * ny + wz * nz < 0.0:
+                break
+            d = SURFACE_M
+        gone += d
+    return True, x + gone * wx, y + gone * wy, z + gone * wz
