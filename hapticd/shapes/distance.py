@@ -19,6 +19,8 @@ CAPSULE = 3
 CYLINDER = 4
 FIELD = 5
 
+_POINT_M = 1e-100
+
 
 def plane_distance(x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """The plane z = 0, solid below."""
@@ -28,7 +30,7 @@ def plane_distance(x: float, y: float, z: float) -> tuple[float, float, float, f
 def sphere_distance(x: float, y: float, z: float, radius: float) -> tuple[float, float, float, float]:
     """A ball about the origin [m]."""
     length = sqrt(x * x + y * y + z * z)
-    if length == 0.0:
+    if length < _POINT_M:
         return -radius, 0.0, 0.0, 1.0
     return length - radius, x / length, y / length, z / length
 
@@ -77,7 +79,7 @@ def capsule_distance(
     else:
         z = 0.0
     length = sqrt(x * x + y * y + z * z)
-    if length == 0.0:
+    if length < _POINT_M:
         return -radius, 1.0, 0.0, 0.0
     return length - radius, x / length, y / length, z / length
 
@@ -89,7 +91,7 @@ def cylinder_distance(
     across = sqrt(x * x + y * y)
     ux = 1.0
     uy = 0.0
-    if across > 0.0:
+    if across > _POINT_M:
         ux = x / across
         uy = y / across
     sz = 1.0

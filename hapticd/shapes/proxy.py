@@ -18,12 +18,22 @@ from hapticd.shapes.surface import SURFACE_M, distance, land, trace
 
 _LEAST_M2 = 1e-16
 _SLIDES = 10
+_LEAST_SHARE = 0.01
+_CREASE = 0.02
+_LANDINGS = 3
+_WAY_OUT = 100
+_CONE = 1.02
 _SAME_SIDE = 0.9
 
 
 def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> None:
-    """Move the goal along the surface, as near to the device as it can come from where it is."""
+    """Move the goal along the surface, as near to the device as it can come from where it is.
+
+    A way that meets another face goes on along the crease of the two; one that brings it no nearer is shortened.
+    """
     share = 1.0
+    ex = ey = ez = 0.0
+    crease = False
     wx = px - proxy.gx
     wy = py - proxy.gy
     wz = pz - proxy.gz
@@ -32,10 +42,16 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
     ny = proxy.uy
     nz = proxy.uz
     for _ in range(_SLIDES):
-        along = wx * nx + wy * ny + wz * nz
-        tx = share * (wx - along * nx)
-        ty = share * (wy - along * ny)
-        tz = share * (wz - along * nz)
+        if crease:
+            along = share * (wx * ex + wy * ey + wz * ez)
+            tx = along * ex
+            ty = along * ey
+            tz = along * ez
+        else:
+            along = wx * nx + wy * ny + wz * nz
+            tx = share * (wx - along * nx)
+            ty = share * (wy - along * ny)
+            tz = share * (wz - along * nz)
         if tx * tx + ty * ty + tz * tz < _LEAST_M2:
             return
         d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
@@ -51,23 +67,38 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             proxy.ux = nx = mx
             proxy.uy = ny = my
             proxy.uz = nz = mz
+            if gained < _LEAST_M2:
+                return
             wx = vx
             wy = vy
             wz = vz
             ww = vv
             share = 1.0
-            if gained < _LEAST_M2:
-                return
+            crease = False
         else:
-            tx = x - proxy.gx
-            ty = y - proxy.gy
-            tz = z - proxy.gz
-            if tx * tx + ty * ty + tz * tz < _LEAST_M2:  # an edge: it stays there, whichever face is asked
-                proxy.ux = mx
-                proxy.uy = my
-                proxy.uz = mz
-                return
-            share *= 0.5
+            if wx * mx + wy * my + wz * mz >= 0.0:
+                vx = x - proxy.gx
+                vy = y - proxy.gy
+                vz = z - proxy.gz
+                if vx * vx + vy * vy + vz * vz < _LEAST_M2:  # over an edge: seen from this face it may be free
+                    proxy.ux = mx
+                    proxy.uy = my
+                    proxy.uz = mz
+                    return
+            ex = ny * mz - nz * my
+            ey = nz * mx - nx * mz
+            ez = nx * my - ny * mx
+            ee = ex * ex + ey * ey + ez * ez
+            if ee > _CREASE and not crease:
+                ee = sqrt(ee)
+                ex /= ee
+                ey /= ee
+                ez /= ee
+                crease = True
+            else:
+                share *= 0.25
+                if share < _LEAST_SHARE:
+                    return
 
 
 def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
@@ -93,7 +124,8 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
     if proxy.touching:
         if proxy.exact:
             d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
-            if proxy.ux * nx + proxy.uy * ny + proxy.uz * nz > _SAME_SIDE:
+            # The nearest point of a convex solid on this side, or of all the walls of a convex room.
+            if proxy.ux * nx + proxy.uy * ny + proxy.uz * nz > _SAME_SIDE or proxy.sign < 0.0:
                 if d >= 0.0:
                     release(proxy, x, y, z, d)
                     return
@@ -127,8 +159,19 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
                 d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
                 release(proxy, x, y, z, d)
                 return
+            near = (x - proxy.gx) * (x - proxy.gx) + (y - proxy.gy) * (y - proxy.gy) + (z - proxy.gz) * (z - proxy.gz)
+            wx = proxy.gx
+            wy = proxy.gy
+            wz = proxy.gz
             meet(proxy, others, voxels, gx, gy, gz)
             slide(proxy, others, voxels, x, y, z)
+            gx = x - proxy.gx
+            gy = y - proxy.gy
+            gz = z - proxy.gz
+            if gx * gx + gy * gy + gz * gz > near:
+                proxy.gx = wx
+                proxy.gy = wy
+                proxy.gz = wz
     else:
         d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
         wx = x - proxy.gx
@@ -193,8 +236,27 @@ def release(proxy: Any, x: float, y: float, z: float, d: float) -> None:
 
 
 def meet(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
-    """Put the goal on the surface near a point."""
-    _, proxy.gx, proxy.gy, proxy.gz, proxy.ux, proxy.uy, proxy.uz = land(proxy, others, voxels, x, y, z)
+    """Put the goal on the surface near a point; where two shapes send it to and fro, straight out of both."""
+    d, gx, gy, gz, nx, ny, nz = land(proxy, others, voxels, x, y, z)
+    if d > SURFACE_M or d < -SURFACE_M:
+        d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
+        ux = nx
+        uy = ny
+        uz = nz
+        for _ in range(_WAY_OUT):
+            if d > -SURFACE_M:
+                break
+            x -= d * ux
+            y -= d * uy
+            z -= d * uz
+            d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
+        d, gx, gy, gz, nx, ny, nz = land(proxy, others, voxels, x, y, z)
+    proxy.gx = gx
+    proxy.gy = gy
+    proxy.gz = gz
+    proxy.ux = nx
+    proxy.uy = ny
+    proxy.uz = nz
 
 
 def read(proxy: Any, x: float, y: float, z: float) -> None:
@@ -239,10 +301,21 @@ def rub(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -
         proxy.sliding = False
     else:
         proxy.sliding = True
-        share = proxy.dynamic_friction * proxy.depth_m / sqrt(ee)
-        d, x, y, z, _, _, _ = land(
-            proxy, others, voxels, proxy.gx + share * ex, proxy.gy + share * ey, proxy.gz + share * ez
-        )
+        free_m = proxy.dynamic_friction * proxy.depth_m
+        share = free_m / sqrt(ee)
+        for _ in range(_LANDINGS):  # round a corner the way along the surface is longer than the straight one
+            d, x, y, z, _, _, _ = land(
+                proxy, others, voxels, proxy.gx + share * ex, proxy.gy + share * ey, proxy.gz + share * ez
+            )
+            wx = x - proxy.gx
+            wy = y - proxy.gy
+            wz = z - proxy.gz
+            vv = wx * wx + wy * wy + wz * wz
+            if vv <= _CONE * free_m * free_m + _LEAST_M2:
+                break
+            share *= 0.9 * free_m / sqrt(vv)
+        else:
+            d = 1.0  # no place found: it goes to the goal
         wx = proxy.sx - px
         wy = proxy.sy - py
         wz = proxy.sz - pz

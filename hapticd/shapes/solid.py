@@ -161,18 +161,13 @@ class Proxy(ProxyScalars):
     def move(self, pose: Pose) -> Vector:
         """Move the solid to another pose of its first shape; the way of the touched material point [m]."""
         own = (self.sx, self.sy, self.sz) if self.rough else (self.gx, self.gy, self.gz)
-        before = _pose(self)
-        old = before.point(own)
-        device = before.point((self.gx, self.gy, self.gz))
+        x, y, z = _pose(self).point(own)
         _put(self, pose)
         self._bound(pose)
-        if not self.touching:
-            self.gx, self.gy, self.gz = pose.own(device)
-            # The surface may have come nearer than it was.
-            self.d = 0.0
+        if not self.touching:  # then the trace goes on from where the device was, seen from the solid
             return 0.0, 0.0, 0.0
-        x, y, z = pose.point(own)
-        return x - old[0], y - old[1], z - old[2]
+        to_x, to_y, to_z = pose.point(own)
+        return to_x - x, to_y - y, to_z - z
 
     def _bound(self, pose: Pose) -> None:
         """Set the half space or ball out of which nothing is touched."""

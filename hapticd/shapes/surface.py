@@ -95,6 +95,7 @@ def trace(
         wy /= length
         wz /= length
     gone = SURFACE_M if on else 0.0
+    nx = ny = nz = 0.0
     for _ in range(_STEPS):
         if gone >= length:
             d, nx, ny, nz = distance(proxy, others, voxels, px, py, pz)
@@ -105,4 +106,8 @@ def trace(
                 break
             d = SURFACE_M
         gone += d
+    else:  # a way along a surface: over it if the device is on the same side of it
+        d, ex, ey, ez = distance(proxy, others, voxels, px, py, pz)
+        if d >= 0.0 and nx * ex + ny * ey + nz * ez > 0.0:
+            return False, px, py, pz
     return True, x + gone * wx, y + gone * wy, z + gone * wz
