@@ -116,7 +116,12 @@ class VelocityConfig(Table):
         "difference",
         description="difference over `samples`, low-pass of it, first-order adaptive window, or the device's own",
     )
-    samples: int = Field(1, ge=1, le=64, description="samples that the difference spans; longest window of foaw")
+    samples: int = Field(
+        1,
+        ge=1,
+        le=64,
+        description="samples that the difference spans; longest window of foaw, 256000 a second over all axes at most",
+    )
     cutoff_hz: float = Field(200.0, gt=0.0, le=1e5, description="corner of the low-pass [Hz]")
     noise_m: float | None = Field(
         None,
@@ -141,7 +146,8 @@ class SafetyConfig(Table):
     """[safety]: what the guard allows."""
 
     profile: Literal["device", "simulation"] = Field(
-        "device", description="simulation lifts force and speed limits; only simulated devices accept it"
+        "device",
+        description="simulation lifts these limits, to what the device itself can do; only for simulated devices",
     )
     max_force_n: float | None = Field(
         None, gt=0.0, le=1000.0, description="largest force magnitude [N]; unset: the device's own limit"

@@ -12,7 +12,7 @@ from hapticd.doctor.rights import user_name
 from hapticd.doctor.tree import ROOT, listed, numbers, read, read_if_there
 
 _STEAL_NOTICED = 0.001
-_ORDERED = ("x86_64", "AMD64", "i686")
+_ORDERED = ("x86_64", "AMD64")
 _CPUS = "sys/devices/system/cpu"
 _SHALLOW_US = 20
 
@@ -27,8 +27,8 @@ def architecture(machine: str | None = None) -> Finding:
     if machine in _ORDERED:
         return ok(f"{machine}: stores stay in order, as the shared ring needs it")
     return problem(
-        f"{machine}: the ring between the two processes is safe on x86 only, so the daemon does not start here",
-        "# use a computer with an x86 processor",
+        f"{machine}: the ring between the two processes is safe on 64-bit x86 only, so the daemon does not start here",
+        "# use a computer with a 64-bit x86 processor",
     )
 
 

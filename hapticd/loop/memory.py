@@ -3,8 +3,8 @@
     words | the driver's metrics | answer | request | events | the driver's trace | tick records
 
 One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
-copied a slot: on x86 stores become visible in order, so what was not overwritten by then is whole. Other machines
-do not promise that, and plain Python cannot ask them to, so they are refused.
+copied a slot: on x86-64 stores become visible in order and a word in one go, so what was not overwritten by then is
+whole. Other machines do not promise that, and plain Python cannot ask them to, so they are refused.
 
 The memory is an anonymous file: it has no name, and it is gone when both processes are.
 """
@@ -83,8 +83,10 @@ class SharedMemory:
     """
 
     def __init__(self, layout: RecordLayout, rate_hz: float, descriptor: int | None = None) -> None:
-        if platform.machine() not in ("x86_64", "AMD64", "i686"):
-            raise HapticdError(f"hapticd needs an x86 processor: on {platform.machine()} the shared ring is not safe")
+        if platform.machine() not in ("x86_64", "AMD64"):
+            raise HapticdError(
+                f"hapticd needs a 64-bit x86 processor: on {platform.machine()} the shared ring is not safe"
+            )
         self.layout = layout
         self.slots = int(HISTORY_S * rate_hz)
         size = _RECORDS + self.slots * layout.size

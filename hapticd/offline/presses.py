@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -39,9 +38,9 @@ def point_of(loaded: LoadedConfig) -> Point:
             f"{name}: device.options.initial_position_m = {device.initial_position_m:g}: must be 0 or more: inside the "
             "wall the daemon ramps the force up, which the engine of a map leaves out"
         )
-    limit_n = math.inf
+    limit_n = device.largest_force_n
     if config.safety.profile != "simulation":
-        limits = (config.safety.max_force_n, config.safety.max_axis_force_n, device.max_force_n or math.inf)
+        limits = (config.safety.max_force_n, config.safety.max_axis_force_n, limit_n)
         limit_n = min(limit for limit in limits if limit is not None)
     wall = config.scene.walls[0]
     return Point(device, wall, loaded.params, config.loop.period_s, limit_n, config.velocity.samples)

@@ -78,7 +78,7 @@ class SimulatedDriver(Driver[SimulationOptions]):
             model=f"{self.NAME} ({options.model} model)",
             serial="",
             axes=("x",),
-            max_force_n=options.max_force_n or math.inf,
+            max_force_n=options.largest_force_n,
             resolution_m=options.resolution_m,
             workspace_m=((self._wall_m - FARTHEST_M, self._wall_m + FARTHEST_M),),
             nominal_rate_hz=1.0 / self.period_s,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import itertools
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -225,6 +226,12 @@ class SimulationOptions(DriverOptions):
     )
     hand: Hand = Field(default_factory=Hand, description="who holds the device")
     changes: tuple[Change, ...] = Field((), description="new values from some time on")
+
+    @property
+    def largest_force_n(self) -> float:
+        """The force at which the actuator saturates, the largest one where that changes; `inf`: it never does [N]."""
+        changed = [change.max_force_n for change in self.changes if change.max_force_n is not None]
+        return max(limit_n or math.inf for limit_n in (self.max_force_n, *changed))
 
     @model_validator(mode="before")
     @classmethod

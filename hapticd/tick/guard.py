@@ -114,7 +114,7 @@ class Guard:
         mode: what is let through.
         gain: how far a release has come, 1 armed to 0 disarmed.
         latched: stopped by a fault until `clear`.
-        max_force_n, max_axis_n: force limits now, magnitude and along one axis [N]; `inf` in simulation.
+        max_force_n, max_axis_n: force limits now, magnitude and along one axis [N]; `inf` where there is none.
         limit_n: the smaller one, largest force of a single contact [N].
         max_speed_m_per_s: over-speed stop [m/s]; `inf` in simulation.
         limited: whether the last force was reduced by a limit.
@@ -300,7 +300,7 @@ def limits(safety: SafetyConfig, info: DeviceInfo) -> tuple[float, float, float]
             raise ConfigError(
                 f'safety.profile = "simulation": {info.model} is a real device; its force limits stay in force'
             )
-        return math.inf, math.inf, math.inf
+        return info.max_force_n, info.max_force_n, math.inf  # beyond that it saturates: no force, and none in the books
     max_force_n = info.max_force_n if safety.max_force_n is None else safety.max_force_n
     if not max_force_n <= info.max_force_n:
         raise ConfigError(f"safety.max_force_n = {max_force_n:g}: {info.model} takes at most {info.max_force_n:g} N")

@@ -27,6 +27,10 @@ LEAST_REPEATS = 3
 """A device is frozen that has had nothing new for this time [s], and for this many samples of its nominal rate, and at
 this many reads in a row: whether loop or device is the slower one."""
 
+FOAW_PER_S = 256_000
+"""Most samples that adaptive windows may span, over all axes and ticks of a second: about 0.15 us each, where the hand
+stands still."""
+
 
 class Motion:
     """Positions, velocities and time, from one sample to the next.
@@ -47,7 +51,8 @@ class Motion:
         repeated_s: for how long they have come [s].
 
     Raises:
-        ConfigError: velocity is to come from a device that does not measure it.
+        ConfigError: velocity is to come from a device that does not measure it, or from more samples than can be
+            looked at in a tick.
     """
 
     __slots__ = (
@@ -77,6 +82,12 @@ class Motion:
         if velocity.estimator == "device" and not info.has_velocity:
             raise ConfigError(f'velocity.estimator = "device": {info.model} does not measure its velocity')
         axes = len(info.axes)
+        most = int(FOAW_PER_S * period_s / axes)
+        if velocity.estimator == "foaw" and velocity.samples > most:
+            raise ConfigError(
+                f"velocity.samples = {velocity.samples}: foaw looks at each of them in every tick; at this rate and on "
+                f"{info.model} it has time for {most}"
+            )
         self.position_m = [0.0] * axes
         self.velocity_m_per_s = [0.0] * axes
         self.speed_squared = 0.0

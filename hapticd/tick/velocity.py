@@ -183,6 +183,7 @@ class AdaptiveWindow(_History):
         push(self, self.position_m, time_s, position_m, dt_s)
         newest = self.newest
         now_s = time_s[newest]
+        noise_m = self._noise_m
         lowest = -math.inf
         highest = math.inf
         for length in range(1, self.filled):
@@ -192,9 +193,11 @@ class AdaptiveWindow(_History):
             if not lowest <= slope <= highest:
                 break
             self.velocity_m_per_s = slope
-            room = self._noise_m / span_s
-            lowest = max(lowest, slope - room)
-            highest = min(highest, slope + room)
+            room = noise_m / span_s
+            if slope - room > lowest:
+                lowest = slope - room
+            if slope + room < highest:
+                highest = slope + room
         return self.velocity_m_per_s
 
 

@@ -305,7 +305,8 @@ def test_the_history_is_eight_seconds_at_the_set_rate() -> None:
         memory.close()
 
 
-def test_a_processor_that_reorders_stores_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("platform.machine", lambda: "aarch64")
-    with pytest.raises(HapticdError, match="aarch64"):
+@pytest.mark.parametrize("machine", ["aarch64", "i686"])
+def test_a_processor_that_reorders_or_tears_stores_is_refused(monkeypatch: pytest.MonkeyPatch, machine: str) -> None:
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    with pytest.raises(HapticdError, match=machine):
         SharedMemory(LAYOUT, RATE_HZ)

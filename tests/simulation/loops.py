@@ -98,7 +98,9 @@ def any_case(law: str, seed: int, few_terms: bool = False) -> Case:
             for time_s in times(3)
         ],
     }
-    limit_n = math.inf if one_in(3) else min(decades(-0.5, 1.2), saturation or math.inf)
+    limit_n = saturation or math.inf
+    if not one_in(3):
+        limit_n = min(decades(-0.5, 1.2), limit_n)
     params: dict[str, Any] = {}
     if law == "awkward":
         params = {"share": dice.choice([1.0, -0.5, 3.0]), "push_n": dice.uniform(-1.0, 3.0)}
@@ -139,9 +141,8 @@ def a_case(
     """A loop that is written down."""
     model = LAWS[law]
     options = SimulationOptions.model_validate(device)
-    given = Point(
-        options, WallConfig.model_validate(wall), model.Params(**(params or {})), **{"target_m": 0.0, **point}
-    )
+    defaults = {"target_m": 0.0, "max_force_n": options.largest_force_n}
+    given = Point(options, WallConfig.model_validate(wall), model.Params(**(params or {})), **{**defaults, **point})
     return Case(model, given, ticks, min(50, ticks), stepwise=stepwise, safety=safety)
 
 

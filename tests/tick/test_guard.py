@@ -96,8 +96,13 @@ def test_a_real_device_without_a_limit_of_its_own_needs_one() -> None:
 def test_the_simulation_profile_is_refused_for_a_real_device() -> None:
     with pytest.raises(ConfigError, match=r"simulation.*real device"):
         guard(profile="simulation")
-    free = guard(device(simulated=True), profile="simulation", max_force_n=1.0)
+    free = guard(device(math.inf, simulated=True), profile="simulation", max_force_n=1.0)
     assert (free.max_force_n, free.max_axis_n, free.max_speed_m_per_s) == (math.inf, math.inf, math.inf)
+
+
+def test_in_simulation_nothing_is_asked_of_a_device_beyond_what_it_saturates_at() -> None:
+    made = guard(device(12.0, simulated=True), profile="simulation", max_force_n=1.0, max_axis_force_n=1.0)
+    assert (made.max_force_n, made.max_axis_n, made.limit_n) == (12.0, 12.0, 12.0)
 
 
 def test_a_refused_configuration_changes_nothing() -> None:
@@ -207,10 +212,10 @@ def test_a_raised_limit_goes_up_by_a_ramp() -> None:
 
 
 def test_limits_that_return_from_simulation_start_from_the_force_in_use() -> None:
-    info = device(simulated=True)
+    info = device(math.inf, simulated=True)
     made = armed(info, profile="simulation")
     forces = written(made, 100.0, 1)
-    made.configure(SafetyConfig(ramp_s=0.02), info, [forces[-1]])
+    made.configure(SafetyConfig(ramp_s=0.02, max_force_n=12.0), info, [forces[-1]])
     forces += written(made, 100.0, 30)
     assert forces[-1] == pytest.approx(12.0)
     assert max(a - b for a, b in itertools.pairwise(forces)) == pytest.approx(88.0 / 20.0)

@@ -102,7 +102,8 @@ def test_the_damping_that_was_reached_is_told_to_the_next_law() -> None:
 
 
 def test_the_simulation_profile_lifts_the_limits_of_a_simulated_device() -> None:
-    rig = Rig(wall(12000.0), at_m=0.0, simulated=True, safety={"profile": "simulation"})
+    lifted = {"profile": "simulation", "max_force_n": 12.0}
+    rig = Rig(wall(12000.0), at_m=0.0, simulated=True, max_force_n=math.inf, safety=lifted)
     assert rig.force(-0.05) == pytest.approx(600.0)
     with pytest.raises(ConfigError):
         Guard(SafetyConfig(profile="simulation"), device())

@@ -8,8 +8,8 @@ from hapticd.config.models import VelocityConfig
 from hapticd.device import Sample
 from hapticd.errors import ConfigError
 from hapticd.tick.event import EventCode
-from hapticd.tick.motion import FROZEN_S
-from tests.tick.rig import PERIOD_S, Rig, wall
+from hapticd.tick.motion import FROZEN_S, Motion
+from tests.tick.rig import PERIOD_S, Rig, device, wall
 from tests.tick.transitions import pressed
 
 
@@ -88,3 +88,14 @@ def test_a_device_without_velocity_cannot_be_asked_for_it() -> None:
     with pytest.raises(ConfigError, match=r"velocity\.estimator.*a device does not measure"):
         Rig(velocity=VelocityConfig(estimator="device"))
     Rig(velocity=VelocityConfig(estimator="device"), has_velocity=True)
+
+
+def test_an_adaptive_window_that_there_is_no_time_for_is_refused() -> None:
+    """Each sample of it is looked at in every tick."""
+    longest = VelocityConfig(estimator="foaw", samples=64)
+    Motion(longest, device("xyz"), 1e-3)
+    Motion(longest, device("z"), 1.0 / 4000.0)
+    Motion(VelocityConfig(samples=64), device("xyz"), 1.0 / 8000.0)
+    Motion(VelocityConfig(estimator="foaw", samples=10), device("xyz"), 1.0 / 8000.0)
+    with pytest.raises(ConfigError, match=r"velocity\.samples = 64: foaw .* has time for 10$"):
+        Motion(longest, device("xyz"), 1.0 / 8000.0)

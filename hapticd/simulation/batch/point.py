@@ -19,7 +19,7 @@ class Point:
         wall: stiffness, damping and their changes; where it stands does not matter.
         params: the law's parameters.
         period_s: time between ticks, whole nanoseconds where it is to be the daemon's to the last bit [s].
-        max_force_n: the guard's limit [N].
+        max_force_n: the guard's limit; the daemon's is never above the force at which the device saturates [N].
         velocity_samples: samples that the velocity difference spans.
         target_m: where it should settle; NaN: nowhere, then no settling time is looked for [m].
         band_m: settled means within this of the target [m].

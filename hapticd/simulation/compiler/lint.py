@@ -177,7 +177,7 @@ class _Body(ast.NodeVisitor):
             if isinstance(operator, ast.In | ast.NotIn):
                 self._found(node, "`in`", "compare with each value", True)
             if isinstance(operator, ast.Is | ast.IsNot):
-                self._found(node, "`is`", "a parameter that is not set arrives as -1; compare with ==", True)
+                self._found(node, "`is`", "a law sees numbers only, never None; compare with ==", True)
         self.generic_visit(node)
 
     def visit_Attribute(self, node: ast.Attribute) -> None:
