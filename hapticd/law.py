@@ -17,6 +17,10 @@ A state that has the fields `damping_n_s_per_m` or `felt_mass_kg` has them publi
 A law that learns names what it has learnt, and the next law on that wall, itself when the device is armed again, finds
 it in its snapshot: `LEARNED = ("damping_n_s_per_m",)`. What a law does not name is gone with it.
 
+A law that outside the wall keeps no time and learns nothing says so: `RESTS_OUTSIDE = True`. Then it is not asked while
+nothing is touched, from the second sample outside on, when it has seen the last force end; what is not touched costs
+nothing. A law that counts the time between two touches does not say so, and is asked at every sample.
+
 Signs: x < 0 is inside the wall; a positive force pushes the device out.
 """
 
@@ -42,6 +46,7 @@ __all__ = [
     "fresh_state",
     "learned_fields",
     "plain_object",
+    "rests_outside",
     "scalar_params",
     "state_fields",
 ]
@@ -192,6 +197,18 @@ def learned_fields(law: ModuleType) -> tuple[str, ...]:
     return learned
 
 
+def rests_outside(law: ModuleType) -> bool:
+    """Whether a law need not be asked while nothing is touched.
+
+    Raises:
+        PluginError: `RESTS_OUTSIDE` is neither True nor False.
+    """
+    rests = getattr(law, "RESTS_OUTSIDE", False)
+    if not isinstance(rests, bool):
+        raise PluginError(f"law {law.__name__}: RESTS_OUTSIDE must be True or False, not {rests!r}")
+    return rests
+
+
 def scalar_params(params: LawParams) -> dict[str, Scalar]:
     """A law's parameters as plain scalars: a `Literal` value becomes its index.
 
@@ -199,9 +216,8 @@ def scalar_params(params: LawParams) -> dict[str, Scalar]:
         PluginError: a parameter is neither a number, a bool nor a choice of literals.
     """
     scalars: dict[str, Scalar] = {}
-    for name, info in type(params).model_fields.items():
+    for name, choices in _choices(type(params)).items():
         value = getattr(params, name)
-        choices = typing.get_args(info.annotation) if typing.get_origin(info.annotation) is Literal else ()
         if choices:
             scalars[name] = choices.index(value)
         elif isinstance(value, bool | int | float):
@@ -209,6 +225,16 @@ def scalar_params(params: LawParams) -> dict[str, Scalar]:
         else:
             raise PluginError(f"parameter {name} = {value!r}: a law takes numbers, bools and choices only")
     return scalars
+
+
+@functools.cache
+def _choices(kind: type[LawParams]) -> dict[str, tuple[Any, ...]]:
+    """Every parameter with its literals, none for one that is no choice; `check_law` asks before any loop does."""
+    annotations = {name: info.annotation for name, info in kind.model_fields.items()}
+    return {
+        name: typing.get_args(annotation) if typing.get_origin(annotation) is Literal else ()
+        for name, annotation in annotations.items()
+    }
 
 
 @functools.cache
@@ -240,5 +266,7 @@ def check_law(law: ModuleType) -> None:
             raise PluginError(f"law {law.__name__}: has no `{part}` (a law needs Params, State, start, step)")
     if not (isinstance(law.Params, type) and issubclass(law.Params, LawParams)):
         raise PluginError(f"law {law.__name__}: Params must derive from hapticd.law.LawParams")
+    _choices(law.Params)
     state_fields(law)
     learned_fields(law)
+    rests_outside(law)

@@ -12,6 +12,8 @@ from pydantic import Field
 
 from hapticd.law import LawParams
 
+RESTS_OUTSIDE = True
+
 
 class Params(LawParams):
     """How hard it brakes."""

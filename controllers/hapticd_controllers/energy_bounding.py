@@ -14,6 +14,8 @@ from pydantic import Field
 
 from hapticd.law import LawParams
 
+RESTS_OUTSIDE = True
+
 LIMIT = 1e12
 """No debt [J] is larger, so that nothing ever overflows."""
 

@@ -15,6 +15,7 @@ from hapticd.law import LawParams
 from hapticd.tick.energy import CycleFields, cycle_ended
 
 LEARNED = ("damping_n_s_per_m",)
+RESTS_OUTSIDE = True
 
 WORK_SPRING, WORK_TOTAL = range(2)
 PAIRING_EXACT, PAIRING_NEW_FORCE, PAIRING_POWER, PAIRING_HELD_POWER = range(4)

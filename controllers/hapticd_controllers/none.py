@@ -9,6 +9,8 @@ from typing import Any
 
 from hapticd.law import LawParams
 
+RESTS_OUTSIDE = True
+
 
 class Params(LawParams):
     """Nothing to set."""

@@ -14,6 +14,8 @@ from pydantic import Field
 
 from hapticd.law import LawParams
 
+RESTS_OUTSIDE = True
+
 SOFTEST, STIFFEST = 1e-12, 1e12
 """Stiffness of a wall [N/m] within which nothing is divided by zero or overflows."""
 LIMIT = 1e12

@@ -14,6 +14,8 @@ from pydantic import Field
 
 from hapticd.law import LawParams
 
+RESTS_OUTSIDE = True
+
 OBSERVER_EXACT, OBSERVER_PRINTED = range(2)
 REFERENCE_ZERO, REFERENCE_STORED = range(2)
 RESET_CONTACT, RESET_NEVER = range(2)

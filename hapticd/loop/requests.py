@@ -134,7 +134,9 @@ class RequestHandler:
             yield from self._import(law)
         module = self._laws[law]
         yield
-        pattern = RunningLaw(module, module.Params.model_validate(params))
+        new_params = module.Params.model_validate(params)
+        yield
+        pattern = RunningLaw(module, new_params)
         yield
         new_safety = SafetyConfig.model_validate(safety)
         yield

@@ -20,6 +20,7 @@ from hapticd.law import (
     Scalar,
     fresh_state,
     plain_object,
+    rests_outside,
     scalar_params,
     state_fields,
 )
@@ -37,6 +38,9 @@ _LARGEST = {
     **dict.fromkeys(("contact_n", "spring_n", "applied_n", "applied_contact_n"), 1e18),
 }
 """What `LawTick` promises of its numbers."""
+
+_SHOWN = ("damping_n_s_per_m", "felt_mass_kg")
+"""What a law's state has published."""
 
 _TAPPING = {"profile": "press-and-release", "newton": -4.0, "release_newton": 2.0, "period_s": 0.25}
 
@@ -115,6 +119,32 @@ class LawContract:
             outside = [force for x, force in zip(made.x_measured_m, made.force_n, strict=True) if not x < 0.0]
             assert 10 < len(outside) < len(made.force_n), "it was tapped and it was let go"
             assert not any(outside), f"{params!r} pushes outside the wall"
+
+    def test_one_that_rests_outside_the_wall_misses_nothing_there(
+        self, module: ModuleType, tried: list[LawParams]
+    ) -> None:
+        """`RESTS_OUTSIDE = True`: asked at every sample or only as the loop asks it, it answers the same inside."""
+        if not rests_outside(module):
+            return
+        draw = random.Random(3)
+        for params in tried:
+            for _ in range(6):
+                snapshot = _snapshot(draw)
+                plain = plain_object("Params", scalar_params(params))
+                always, rested = (_started(module, params, snapshot) for _ in range(2))
+                applied_n = 0.0
+                awake = True
+                for at, tick in enumerate(_taps(draw)):
+                    tick.applied_n = tick.applied_contact_n = applied_n
+                    force_n = module.step(always, plain, tick)
+                    if tick.in_contact or awake:
+                        where = f"{params!r} started from {snapshot}, then at tick {at}: {tick}"
+                        answer_n = module.step(rested, plain, tick)
+                        assert not tick.in_contact or answer_n == force_n, where
+                        awake = tick.in_contact or applied_n != 0.0
+                    for name in _SHOWN:
+                        assert getattr(rested, name, 0.0) == getattr(always, name, 0.0), f"State.{name}: {where}"
+                    applied_n = max(-12.0, min(force_n, 12.0)) if tick.in_contact else 0.0
 
     def test_interpreted_and_compiled_agree_to_the_last_bit(self, module: ModuleType, tried: list[LawParams]) -> None:
         """On presses and releases, and on ticks that a broken device could cause."""

@@ -7,7 +7,16 @@ from types import ModuleType
 from typing import Any
 
 from hapticd.errors import PluginError
-from hapticd.law import LawParams, LawSnapshot, LawTick, fresh_state, learned_fields, plain_object, scalar_params
+from hapticd.law import (
+    LawParams,
+    LawSnapshot,
+    LawTick,
+    fresh_state,
+    learned_fields,
+    plain_object,
+    rests_outside,
+    scalar_params,
+)
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.guard import blended, start_blend
 from hapticd.tick.scene import Wall
@@ -31,6 +40,7 @@ class RunningLaw:
         "publishes",
         "publishes_damping",
         "publishes_mass",
+        "rests",
         "state",
         "step",
     )
@@ -44,6 +54,7 @@ class RunningLaw:
         self.publishes_mass = hasattr(self.state, "felt_mass_kg")
         self.learns_damping = "damping_n_s_per_m" in learned_fields(module)
         self.publishes = self.publishes_damping or self.publishes_mass
+        self.rests = rests_outside(module)
 
     def another(self) -> RunningLaw:
         """The same law once more; sooner made than the first one, which takes its parameters apart."""
@@ -83,6 +94,7 @@ class Contact:
         force_n: the same after the blend of a transition, before the guard's share [N].
         applied_n: what was applied in the end [N].
         damping_n_s_per_m, felt_mass_kg: as published by the law; 0 when it has none.
+        awake: whether a tick outside the wall has anything to do here; else it need only keep `x_m`.
     """
 
     __slots__ = (
@@ -93,6 +105,7 @@ class Contact:
         "_resolution_m",
         "_touched",
         "applied_n",
+        "awake",
         "blend_from_n",
         "blend_from_x_m",
         "blend_limit_n",
@@ -124,6 +137,7 @@ class Contact:
         self.damping_n_s_per_m = 0.0
         self.felt_mass_kg = 0.0
         self.blending = False
+        self.awake = True
         self._touched = True
         self._moved_m = 0.0
         self._contact_n = 0.0
@@ -136,7 +150,7 @@ class Contact:
         self.x_m = self.wall.outward * (position_m - self.wall.position_m)
         self.in_contact = self.x_m < 0.0
         self.blending = False
-        self._touched = True
+        self.awake = self._touched = True
         self.force_n = self.requested_n = 0.0
         self.applied_n = self._applied_contact_n = self._applied_spring_n = 0.0
         self.tick.applied_n = self.tick.applied_contact_n = 0.0
@@ -160,6 +174,7 @@ class Contact:
             dt_s: time between the last two samples [s].
         """
         self.law = law
+        self.awake = self._touched = True  # it is shown that it is outside
         self.damping_n_s_per_m = self.felt_mass_kg = 0.0
         # The law before may have left anything in its tick.
         self.tick = tick = LawTick(self._resolution_m)
@@ -187,17 +202,16 @@ class Contact:
         if self.in_contact:
             start_blend(self, self.applied_n / gain if gain > 0.0 else 0.0, self.x_m, limit_n, ticks)
 
-    def observe(self, position_m: float, velocity_m_per_s: float, dt_s: float) -> None:
+    def observe(self, x_m: float, velocity_m_per_s: float, dt_s: float) -> None:
         """See a new sample.
 
         Args:
-            position_m: position of the wall's axis [m].
-            velocity_m_per_s: velocity of the axis [m/s].
+            x_m: position relative to the wall, < 0 inside [m].
+            velocity_m_per_s: velocity of the wall's axis [m/s].
             dt_s: time since the last sample [s].
         """
         wall = self.wall
         tick = self.tick
-        x_m = wall.outward * (position_m - wall.position_m)
         tick.moved_m = self._moved_m = x_m - self.x_m
         tick.x_m = self.x_m = x_m
         tick.velocity_m_per_s = velocity_m_per_s = wall.outward * velocity_m_per_s
@@ -267,6 +281,7 @@ class Contact:
         touched = in_contact or self.applied_n != 0.0
         if dt_s > 0.0 and (touched or self._touched):  # once more after the touch; then nothing changes any more
             self._touched = touched
+            self.awake = touched or not self.law.rests
             self.ledger.update(
                 self._moved_m,
                 self.applied_n,

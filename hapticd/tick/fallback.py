@@ -11,6 +11,8 @@ from pydantic import Field
 
 from hapticd.law import LawParams
 
+RESTS_OUTSIDE = True
+
 
 class Params(LawParams):
     """Parameters of the fallback."""

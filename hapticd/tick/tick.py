@@ -277,13 +277,19 @@ class ControlTick:
         requested_n = self.requested_n
         force_n = self.force_n
         dt_s = motion.dt_s
-        contacts = self._active
         for axis in self._axes:
             requested_n[axis] = force_n[axis] = 0.0
         if dt_s > 0.0:
-            for contact in contacts:
-                axis = contact.wall.axis
-                contact.observe(position_m[axis], velocity_m_per_s[axis], dt_s)
+            contacts = []
+            for contact in self._active:
+                wall = contact.wall
+                axis = wall.axis
+                x_m = wall.outward * (position_m[axis] - wall.position_m)
+                if x_m < 0.0 or contact.awake:
+                    contact.observe(x_m, velocity_m_per_s[axis], dt_s)
+                    contacts.append(contact)
+                else:
+                    contact.x_m = x_m
             try:
                 for contact in contacts:
                     contact.act(periods)
@@ -292,6 +298,7 @@ class ControlTick:
             except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
                 self._replace_laws(contact, error, periods)
         else:
+            contacts = self._active
             for waiting in contacts:
                 waiting.hold(periods)
         for contact in contacts:

@@ -66,6 +66,20 @@ _tick, _ledger = attrgetter(*LawTick.__slots__), attrgetter(*EnergyLedger.__slot
 Row = tuple[float, ...]
 
 
+class _NotShown:
+    """What a law would have been shown, and would remember, had it not rested: equal to anything."""
+
+    def __eq__(self, other: object) -> bool:
+        return True
+
+    def __hash__(self) -> int:
+        return 0
+
+
+_NOT_SHOWN: Any = _NotShown()
+_RESTING = frozenset(("tick.x_m", "tick.moved_m", "tick.velocity_m_per_s", "contact.moved_m"))
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """One loop.
@@ -253,8 +267,10 @@ def by_the_daemon(case: Case) -> Run:
     (contact,) = tick.contacts
     motion, guard = tick.motion, tick.guard
     law_state = _fields(case.law)
+    rested = [name in _RESTING or name.startswith("law.") for name in names(case.law)]
     run = Run()
     for _ in range(case.ticks):
+        awake = contact.awake
         try:
             force_n = tick.step(driver.read(), point.period_s)
         except DeviceFaultError:
@@ -290,6 +306,9 @@ def by_the_daemon(case: Case) -> Run:
                 guard.limited,
             )
         )
+        if not awake and not contact.in_contact:
+            row = run.rows[-1]
+            run.rows[-1] = tuple(_NOT_SHOWN if rests else value for rests, value in zip(rested, row, strict=True))
     _tell(case, run)
     return run
 

@@ -114,14 +114,17 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
         "start >= self.ticks - self.window})": ("stop one later",),
     },
     "there is one axis": {
-        "ControlTick.step: for contact in contacts:": ("without axis = contact.wall.axis", "without axis = wall.axis"),
+        "ControlTick.step: for contact in self._active:": ("without axis = wall.axis",),
+        "ControlTick.step: for contact in contacts:": ("without wall = contact.wall", "without axis = wall.axis"),
     },
     "time between samples is the period, always": {
         "LongDifference.update: if dt_s > 0.0:": ("Gt 0 is GtE",),
-        "ControlTick.step: if dt_s > 0.0:": ("Gt 0 is GtE", "without for waiting in contacts:"),
+        "ControlTick.step: if dt_s > 0.0:": (
+            "Gt 0 is GtE", "without contacts = self._active", "without for waiting in contacts:",
+        ),
         "ControlTick.step: seen = motion.see(sample, clock_dt_s, passed_s, self._blind)": ("clock_dt_s one later",),
         "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("Gt 0 is GtE",),
-        "Contact.observe: def observe(self, position_m, velocity_m_per_s, dt_s):": ("without tick.dt_s = dt_s",),
+        "Contact.observe: def observe(self, x_m, velocity_m_per_s, dt_s):": ("without tick.dt_s = dt_s",),
     },
     "what does not pass the quick look goes to `_number`, which looks at the same": {
         "Contact.act: if force_n.__class__ is not float or not -MOST < force_n < MOST:": (
@@ -138,8 +141,11 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
         ),
     },
     "it only saves time": {
-        "Contact.settle: touched = in_contact or self.applied_n != 0.0": ("NotEq 0 is Eq", "0.0 is 1.0"),
-        "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("without self._touched = touched",),
+        "ControlTick.step: if x_m < 0.0 or contact.awake:": ("Lt 0 is LtE", "0.0 is 1.0"),
+        "Contact.settle: touched = in_contact or self.applied_n != 0.0": ("0.0 is 1.0",),
+        "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": (
+            "without self._touched = touched", "without self.awake = touched or not self.law.rests",
+        ),
     },
     "a debt that is left where contact ends is for the next law; tests/tick/test_tick_books.py": {
         "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("and is or, or is and",),

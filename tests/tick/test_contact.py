@@ -28,7 +28,7 @@ def tick(
     made: Contact, position_m: float, velocity_m_per_s: float = 0.0, share: float = 1.0, gain: float = 1.0
 ) -> float:
     made.wall.pass_time(1.0)
-    made.observe(position_m, velocity_m_per_s, PERIOD_S)
+    made.observe(made.wall.outward * (position_m - made.wall.position_m), velocity_m_per_s, PERIOD_S)
     made.act(1.0)
     made.settle(share, gain, 12.0, PERIOD_S)
     return made.applied_n
@@ -106,7 +106,7 @@ def test_even_nonsense_outside_is_no_force() -> None:
 )
 def test_nonsense_inside_is_an_error(answer: Any, error: type[Exception]) -> None:
     made = contact(lambda _state, _params, _shown: answer)
-    made.observe(0.009, 0.0, PERIOD_S)
+    made.observe(-0.001, 0.0, PERIOD_S)
     with pytest.raises(error):
         made.act(1.0)
 
@@ -165,7 +165,7 @@ def test_a_limit_that_a_damper_shares_with_the_spring_takes_nothing_from_the_spr
     position_m = 0.01
     for _ in range(10):
         position_m -= 1e-3
-        made.observe(position_m, -1.0, PERIOD_S)
+        made.observe(position_m - 0.01, -1.0, PERIOD_S)
         made.act(1.0)
         made.settle(min(1.0, 12.0 / made.force_n), 1.0, 12.0, PERIOD_S)
     assert made.applied_n == 12.0
