@@ -24,9 +24,7 @@ _IMPOSSIBLE = "the device reported a position that is not possible"
 _LOST = "the device does not know any more where it is"
 _DISARMED, _ARMED = Mode.DISARMED, Mode.ARMED  # Python 3.11 takes 0.1 us to look a member up, each time
 _MODE_FLAGS = (0, int(Flag.ARMED), int(Flag.RELEASING))  # in the order of guard.Mode
-_LIMITED = int(Flag.LIMITED)
-_LATCHED = int(Flag.LATCHED)
-_FALLBACK = int(Flag.FALLBACK)
+_LIMITED, _LATCHED, _FALLBACK = int(Flag.LIMITED), int(Flag.LATCHED), int(Flag.FALLBACK)
 
 
 class ControlTick:
@@ -251,8 +249,7 @@ class ControlTick:
         """
         motion = self.motion
         guard = self.guard
-        passed_s = self.period_s
-        periods = 1.0
+        passed_s, periods = self.period_s, 1.0
         if not self._simulated:
             passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
             periods = passed_s / self.period_s
@@ -303,10 +300,8 @@ class ControlTick:
                 waiting.hold(periods)
         for contact in contacts:
             wall = contact.wall
-            axis = wall.axis
-            outward = wall.outward
-            force_n[axis] += outward * contact.force_n
-            requested_n[axis] += outward * contact.requested_n
+            force_n[wall.axis] += wall.outward * contact.force_n
+            requested_n[wall.axis] += wall.outward * contact.requested_n
         share = guard.reduce(force_n, passed_s)
         gain = guard.gain
         limit_n = guard.limit_n
@@ -322,8 +317,7 @@ class ControlTick:
             contact.start(self.motion.position_m[contact.wall.axis])
 
     def _fallback_law(self) -> RunningLaw:
-        params = fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m)
-        return RunningLaw(fallback, params)
+        return RunningLaw(fallback, fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m))
 
     def _check_speed(self) -> None:
         limit = self.guard.max_speed_m_per_s
@@ -399,9 +393,7 @@ class ControlTick:
 
     def _drop_gone(self) -> None:
         """Close the books of walls whose force has faded out."""
-        gone = [contact for contact in self.leaving if not contact.blending and contact.applied_n == 0.0]
-        if gone:
-            for contact in gone:
-                self.past.absorb(contact.ledger)
-            self.leaving = [contact for contact in self.leaving if contact not in gone]
-            self._active = self.contacts + self.leaving
+        for contact in [each for each in self.leaving if not each.blending and each.applied_n == 0.0]:
+            self.past.absorb(contact.ledger)
+            self.leaving.remove(contact)
+            self._active.remove(contact)

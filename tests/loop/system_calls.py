@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import sys
+from pathlib import Path
 
 from hapticd.config.loading import parse
 from hapticd.loop.loop import ControlLoop
@@ -13,7 +13,7 @@ from hapticd.loop.warm_up import warm_up
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.record import RecordLayout
 
-BEGIN, END = "/begin-of-the-ticks", "/end-of-the-ticks"
+BEGIN, END = Path("/begin-of-the-ticks"), Path("/end-of-the-ticks")
 """Files that are looked for, and are not there, so that it is seen where the ticks begin and end."""
 
 # Slow, and with all of the period for a tick: one that is traced is not taken for one that computes too long.
@@ -41,10 +41,10 @@ def main(ticks: int) -> None:
     def sleep_and_count(deadline_ns: int) -> int:
         nonlocal left
         if left == ticks:
-            os.path.exists(BEGIN)
+            BEGIN.exists()
         left -= 1
         if left == 0:
-            os.path.exists(END)
+            END.exists()
             loop.session.stop_requested = True
         return sleep_until(deadline_ns)
 

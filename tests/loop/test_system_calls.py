@@ -20,9 +20,9 @@ def calls_between_the_marks(trace: Path) -> list[tuple[str, str]]:
     loop = ""
     begun = False
     for line in trace.read_text().splitlines():
-        if BEGIN in line:
+        if str(BEGIN) in line:
             loop, begun = line.split()[0], True
-        elif END in line:
+        elif str(END) in line:
             return found
         elif begun and line.split()[0] == loop and (call := _CALL.match(line)):
             found.append((call[1], call[2]))

@@ -193,7 +193,10 @@ def chosen_cases() -> list[Case]:
             "none", {**noisy, "hand": constant(-1.0)}, {"stiffness_n_per_m": 900.0}, 300, target_m=-1e-3, band_m=4e-4
         ),
         # Out of the wall and exactly onto its surface.
-        a_case("none", {**grid, "resolution_m": 2.0**-12, "hand": shaking(6.0, 15.0, -1.0)}, {"stiffness_n_per_m": 3000.0}, 250),
+        a_case(
+            "none", {**grid, "resolution_m": 2.0**-12, "hand": shaking(6.0, 15.0, -1.0)},
+            {"stiffness_n_per_m": 3000.0}, 250,
+        ),
         # Exactly at the edge of its band, on either side of the target.
         a_case("none", still, NO_WALL, 5, target_m=0.0, band_m=2.0**-10),
         a_case("none", still, NO_WALL, 5, target_m=2.0**-9, band_m=2.0**-10),

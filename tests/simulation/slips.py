@@ -115,7 +115,7 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "there is one axis": {
         "ControlTick.step: for contact in self._active:": ("without axis = wall.axis",),
-        "ControlTick.step: for contact in contacts:": ("without wall = contact.wall", "without axis = wall.axis"),
+        "ControlTick.step: for contact in contacts:": ("without wall = contact.wall",),
     },
     "time between samples is the period, always": {
         "LongDifference.update: if dt_s > 0.0:": ("Gt 0 is GtE",),
