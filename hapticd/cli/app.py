@@ -22,6 +22,7 @@ COMMANDS: Final = {
     "devices": ("devices", "List the devices that the installed drivers find."),
     "controllers": ("plugins", "List the installed laws and their parameters."),
     "status": ("status", "Say how every daemon of this computer is."),
+    "metrics": ("metrics.command", "Print what every daemon says of itself, for Prometheus."),
     "watch": ("watch.command", "Show live what a running daemon measures."),
     "arm": ("remote", "Let a running daemon apply forces."),
     "disarm": ("remote", "Ramp the force of a running daemon to zero."),

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hapticd.service.install import Installation, systemd_runs, unit_states
+from hapticd.service.install import METRICS_UNIT, Installation, systemd_runs, unit_states
 
 app = typer.Typer(
     help="Install the daemon as a service, look at it, remove it.",
@@ -81,5 +81,7 @@ def status(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
                 f"{unit.restarts} restarts" * bool(unit.restarts),
             ]
             typer.echo("; ".join(filter(None, parts)))
-    well = all(file.state == "installed" for file in files) and any(unit.active == "active" for unit in units)
+    well = all(file.state == "installed" for file in files) and any(
+        unit.active == "active" for unit in units if unit.name != METRICS_UNIT
+    )
     raise typer.Exit(0 if well else 1)

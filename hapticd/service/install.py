@@ -19,7 +19,8 @@ from hapticd.errors import HapticdError
 from hapticd.paths import SYSTEM_CONFIG, directory
 from hapticd.replacing import obstacle
 
-UNITS: Final = ("hapticd.service", "hapticd@.service")
+METRICS_UNIT: Final = "hapticd-metrics.service"
+UNITS: Final = ("hapticd.service", "hapticd@.service", METRICS_UNIT)
 
 KEPT: Final = ("/etc/hapticd", "/var/lib/hapticd")
 """What `uninstall` leaves: configurations and fault records."""
@@ -287,14 +288,14 @@ def systemd_runs() -> bool:
 
 
 def unit_states() -> list[UnitState]:
-    """`hapticd.service` and every instance that runs, has failed or starts with the computer.
+    """`hapticd.service` and every other unit that runs, has failed or starts with the computer.
 
     Raises:
         InstallationError: systemd cannot be asked.
     """
     if not systemd_runs():
         return []
-    listed = json.loads(_run("systemctl", "list-units", "--all", "--output=json", "hapticd@*.service"))
+    listed = json.loads(_run("systemctl", "list-units", "--all", "--output=json", "hapticd@*.service", METRICS_UNIT))
     names = ["hapticd.service", *(str(unit["unit"]) for unit in listed)]
     keys = ("Id", "ActiveState", "UnitFileState", "StatusText", "Result", "NRestarts")
     states = []

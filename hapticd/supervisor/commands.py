@@ -51,6 +51,9 @@ class CommandSocket:
         tcp: the TCP endpoint; None for none.
         ring: the keys that it takes.
 
+    Attributes:
+        refused: requests that were answered with no.
+
     Raises:
         InstanceError: it cannot be bound.
     """
@@ -60,6 +63,7 @@ class CommandSocket:
             raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
         self._path = path
         self._names = _names(ring)
+        self.refused = 0
         self._gate: CurveServer | None = None
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.ROUTER)
@@ -137,6 +141,7 @@ class CommandSocket:
 
     def _replier(self, identity: bytes) -> Reply:
         def reply(ok: bool, text: str = "", **fields: Any) -> None:
+            self.refused += not ok
             # A path need not be UTF-8.
             answer = msgpack.packb({"ok": ok, "text": text, **fields}, unicode_errors="surrogateescape")
             with contextlib.suppress(zmq.ZMQError):  # who asked has gone

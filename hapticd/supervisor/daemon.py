@@ -304,7 +304,9 @@ class Daemon:
     def _publish_status(self) -> None:
         state = self.state
         written = state.event_log.recorder.written
-        status = state.status.make(state.config, state.loop, state.recovery, written, self._problem)
+        status = state.status.make(
+            state.config, state.loop, state.recovery, written, state.commands.refused, self._problem
+        )
         state.publisher.status(status.as_map())
         doing = f"no device: {state.recovery.why}" if state.recovery.lost else f"{state.status.rate_hz:.0f} Hz"
         state.notifier.send(f"STATUS={doing}, law {status.law}")

@@ -58,6 +58,7 @@ class StatusBuilder:
         self._rate_from = (time.monotonic(), 0)
         self._fault: LoopEvent | None = None
         self._fault_s = 0.0
+        self._faults = 0
         self._started_s = timestamp_s(time.monotonic_ns(), epoch_offset_ns)
         self._origin_m: dict[str, float] = {}
         self._ticking = False
@@ -95,12 +96,19 @@ class StatusBuilder:
         """Remember the last fault, and where positions count from."""
         if event.is_fault:
             self._fault = event
+            self._faults += 1
             self._fault_s = timestamp_s(event.deadline_ns, self._offset_ns)
         elif event.code in (EventCode.TARED, EventCode.CALIBRATED):
             self._origin_m = {name: float(value) for name, value in event.fields.items()}
 
     def make(
-        self, config: LoadedConfig, loop: LoopProcess, recovery: Recovery, fault_records: int, problem: str
+        self,
+        config: LoadedConfig,
+        loop: LoopProcess,
+        recovery: Recovery,
+        fault_records: int,
+        requests_refused: int,
+        problem: str,
     ) -> Status:
         """The status as it is now.
 
@@ -109,6 +117,7 @@ class StatusBuilder:
             loop: the process of the loop.
             recovery: knows whether there is a device.
             fault_records: written so far.
+            requests_refused: on the control socket so far.
             problem: what stands and should be known, a line; "" when there is nothing.
         """
         self._measure_rate()
@@ -126,10 +135,12 @@ class StatusBuilder:
             ticks=self._ticks,
             overruns=loop.skipped,
             late_histogram=tuple(self._late.counts),
+            late_sum_us=self._late.sum_us,
             late_max_us=self._late.max_us,
             busy_max_us=self._busy_max_us,
             ring_drops=self._ticks_dropped,
             event_drops=self._events_dropped,
+            requests_refused=requests_refused,
             armed=bool(flags & Flag.ARMED),
             fallback=bool(flags & Flag.FALLBACK),
             releasing=bool(flags & Flag.RELEASING),
@@ -163,6 +174,7 @@ class StatusBuilder:
             fault_code=self._fault.code if self._fault else 0,
             fault_text=self._fault.text if self._fault else "",
             fault_timestamp=self._fault_s,
+            faults=self._faults,
             fault_records=fault_records,
         )
         return self.made

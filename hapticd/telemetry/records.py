@@ -225,18 +225,21 @@ class LateHistogram:
 
     Attributes:
         counts: one a bin, one more than there are edges.
+        sum_us: all ticks together [us].
         max_us: the latest tick [us].
     """
 
-    __slots__ = ("counts", "max_us")
+    __slots__ = ("counts", "max_us", "sum_us")
 
     def __init__(self) -> None:
         self.counts = [0] * (len(LATE_EDGES_US) + 1)
+        self.sum_us = 0.0
         self.max_us = 0.0
 
     def add(self, late_us: float) -> None:
         """Count one tick."""
         self.counts[bisect.bisect_right(LATE_EDGES_US, late_us)] += 1
+        self.sum_us += late_us
         if late_us > self.max_us:
             self.max_us = late_us
 
@@ -258,10 +261,12 @@ class Status:
         ticks: ticks that it ran.
         overruns: deadlines that it skipped.
         late_histogram: ticks by how late they were, bins of `LATE_EDGES_US`.
+        late_sum_us: all that they were late, together [us].
         late_max_us: the latest of them [us].
         busy_max_us: the longest tick body [us].
         ring_drops: ticks that the supervisor was too slow to fetch.
         event_drops: events that it was too slow to fetch.
+        requests_refused: requests on the control socket that were not done.
         armed: forces are let through.
         fallback: the law failed, damping stands in for it.
         releasing: the force is being ramped out.
@@ -291,6 +296,7 @@ class Status:
         fault_code: of the last fault since the daemon started; 0 when there was none.
         fault_text: what there was to say about it.
         fault_timestamp: when it happened [s since the epoch]; 0 when there was none.
+        faults: how many there were.
         fault_records: fault records written since the daemon started.
     """
 
@@ -308,10 +314,12 @@ class Status:
     ticks: int = 0
     overruns: int = 0
     late_histogram: tuple[int, ...] = ()
+    late_sum_us: float = 0.0
     late_max_us: float = 0.0
     busy_max_us: float = 0.0
     ring_drops: int = 0
     event_drops: int = 0
+    requests_refused: int = 0
     armed: bool = False
     fallback: bool = False
     releasing: bool = False
@@ -340,6 +348,7 @@ class Status:
     fault_code: int = 0
     fault_text: str = ""
     fault_timestamp: float = 0.0
+    faults: int = 0
     fault_records: int = 0
 
     def as_map(self) -> dict[str, Any]:

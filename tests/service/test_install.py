@@ -19,6 +19,7 @@ FILES = {
     "etc/hapticd/hapticd.toml",
     "usr/local/bin/hapticd",
     "usr/local/lib/systemd/system/hapticd.service",
+    "usr/local/lib/systemd/system/hapticd-metrics.service",
     "usr/local/lib/systemd/system/hapticd@.service",
     "usr/local/lib/sysusers.d/hapticd.conf",
     "usr/local/lib/tmpfiles.d/hapticd.conf",
@@ -171,7 +172,7 @@ def test_status_can_be_read_by_a_program() -> None:
     hapticd = Path(sys.executable).with_name("hapticd")
     done = subprocess.run([hapticd, "service", "status", "--json"], capture_output=True, text=True, check=False)
     shown = json.loads(done.stdout)
-    assert len(shown["files"]) == 5
+    assert len(shown["files"]) == len(FILES) - 2
     assert done.returncode == (0 if shown["units"] and set(shown["files"].values()) == {"installed"} else 1)
 
 

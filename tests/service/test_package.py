@@ -12,7 +12,7 @@ import pytest
 from hapticd.version import __version__
 from tests.daemon.running import Subscriber
 from tests.daemon.test_deaths import PRESSED
-from tests.service.machine import SOURCE, Machine, booted
+from tests.service.machine import SOURCE, Machine, booted, eventually
 
 pytestmark = pytest.mark.timeout(900)  # the first machine ever has to be made
 
@@ -103,6 +103,20 @@ def test_it_installs_and_the_service_runs_from_it(built: Built) -> None:
     assert machine.run("hapticd", "--version").stdout == f"hapticd {__version__}\n"
 
 
+def test_its_metrics_are_served_to_this_computer(built: Built) -> None:
+    machine = built.machine
+    machine.run("systemctl", "start", "hapticd-metrics")
+    assert machine.show("hapticd-metrics", "DynamicUser") == "yes"
+
+    def scraped() -> str:
+        script = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:9876/metrics').read().decode())"
+        return machine.run("python3", "-c", script, check=False).stdout
+
+    eventually(lambda: 'hapticd_up{daemon="system/default"} 1.0' in scraped(), "the daemon in the metrics", machine)
+    assert 'hapticd_armed{daemon="system/default"} 1.0' in scraped()
+    assert "hapticd-metrics.service" in machine.run("hapticd", "service", "status").stdout
+
+
 def test_all_that_it_brings_has_the_version_that_was_tested(built: Built) -> None:
     installed = set(built.said("/opt/hapticd/bin/pip", "freeze").lower().replace("_", "-").split())
     pinned = {line for line in (SOURCE / "constraints.txt").read_text().splitlines() if not line.startswith("#")}
@@ -131,6 +145,7 @@ def test_an_upgrade_keeps_the_configuration_and_says_what_goes_on_with_the_old_v
     machine.run("sh", "-c", REPACK)
     done = machine.run("dpkg", "--install", "/run/next.deb")
     assert "hapticd.service still runs what was installed before: systemctl restart hapticd.service" in done.stdout
+    assert "systemctl restart hapticd-metrics.service" in done.stdout
     assert "enable --now" not in done.stdout
     assert machine.processes("hapticd.service") == before
     assert machine.path(CONFIG).read_text() == PRESSED

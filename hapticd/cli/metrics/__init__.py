@@ -1,0 +1,1 @@
+"""`hapticd metrics`: what the daemons say of themselves, for Prometheus."""
