@@ -126,16 +126,16 @@ def shape_distance(shape: Any, voxels: Any, x: float, y: float, z: float) -> tup
     kind = shape.kind
     if kind == 1:
         d, nx, ny, nz = sphere_distance(x, y, z, shape.a)
+    elif kind == 5:
+        d, nx, ny, nz = field_distance(shape, voxels, x, y, z)
     elif kind == 0:
         d, nx, ny, nz = plane_distance(x, y, z)
     elif kind == 2:
         d, nx, ny, nz = box_distance(x, y, z, shape.a, shape.b, shape.c, shape.r)
     elif kind == 3:
         d, nx, ny, nz = capsule_distance(x, y, z, shape.a, shape.b)
-    elif kind == 4:
-        d, nx, ny, nz = cylinder_distance(x, y, z, shape.a, shape.b, shape.r)
     else:
-        d, nx, ny, nz = field_distance(shape, voxels, x, y, z)
+        d, nx, ny, nz = cylinder_distance(x, y, z, shape.a, shape.b, shape.r)
     if shape.sign < 0.0:
         return -d, -nx, -ny, -nz
     return d, nx, ny, nz

@@ -26,10 +26,13 @@ _CONE = 1.02
 _SAME_SIDE = 0.9
 
 
-def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> None:
+def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> bool:
     """Move the goal along the surface, as near to the device as it can come from where it is.
 
     A way that meets another face goes on along the crease of the two; one that brings it no nearer is shortened.
+
+    Returns:
+        whether the surface there faces the device's way: else it may be free.
     """
     share = 1.0
     ex = ey = ez = 0.0
@@ -52,8 +55,8 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             tx = share * (wx - along * nx)
             ty = share * (wy - along * ny)
             tz = share * (wz - along * nz)
-        if tx * tx + ty * ty + tz * tz < _LEAST_M2:
-            return
+        if tx * tx + ty * ty + tz * tz < proxy.least_m2:
+            break
         d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
         vx = px - x
         vy = py - y
@@ -67,12 +70,12 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             proxy.ux = nx = mx
             proxy.uy = ny = my
             proxy.uz = nz = mz
-            if gained < _LEAST_M2:
-                return
             wx = vx
             wy = vy
             wz = vz
             ww = vv
+            if gained < proxy.least_m2:
+                break
             share = 1.0
             crease = False
         else:
@@ -81,10 +84,10 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
                 vy = y - proxy.gy
                 vz = z - proxy.gz
                 if vx * vx + vy * vy + vz * vz < _LEAST_M2:  # over an edge: seen from this face it may be free
-                    proxy.ux = mx
-                    proxy.uy = my
-                    proxy.uz = mz
-                    return
+                    proxy.ux = nx = mx
+                    proxy.uy = ny = my
+                    proxy.uz = nz = mz
+                    break
             ex = ny * mz - nz * my
             ey = nz * mx - nx * mz
             ez = nx * my - ny * mx
@@ -98,7 +101,10 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             else:
                 share *= 0.25
                 if share < _LEAST_SHARE:
-                    return
+                    break
+    read(proxy, wx, wy, wz, ww)
+    facing: bool = wx * nx + wy * ny + wz * nz < 0.0
+    return facing
 
 
 def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
@@ -145,33 +151,26 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
                 if proxy.rough:
                     rub(proxy, others, voxels, x, y, z)
                 return
-        wx = x - proxy.gx
-        wy = y - proxy.gy
-        wz = z - proxy.gz
-        if wx * proxy.ux + wy * proxy.uy + wz * proxy.uz < 0.0:
-            slide(proxy, others, voxels, x, y, z)
-            wx = x - proxy.gx
-            wy = y - proxy.gy
-            wz = z - proxy.gz
-        if wx * proxy.ux + wy * proxy.uy + wz * proxy.uz >= 0.0:
+        if not slide(proxy, others, voxels, x, y, z):
             hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, True)
             if not hit:
                 d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
                 release(proxy, x, y, z, d)
                 return
-            near = (x - proxy.gx) * (x - proxy.gx) + (y - proxy.gy) * (y - proxy.gy) + (z - proxy.gz) * (z - proxy.gz)
+            before_m = proxy.depth_m
             wx = proxy.gx
             wy = proxy.gy
             wz = proxy.gz
             meet(proxy, others, voxels, gx, gy, gz)
             slide(proxy, others, voxels, x, y, z)
-            gx = x - proxy.gx
-            gy = y - proxy.gy
-            gz = z - proxy.gz
-            if gx * gx + gy * gy + gz * gz > near:
+            if proxy.depth_m > before_m:
                 proxy.gx = wx
                 proxy.gy = wy
                 proxy.gz = wz
+                wx = x - wx
+                wy = y - wy
+                wz = z - wz
+                read(proxy, wx, wy, wz, wx * wx + wy * wy + wz * wz)
     else:
         d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
         wx = x - proxy.gx
@@ -194,7 +193,6 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
         proxy.sy = proxy.gy
         proxy.sz = proxy.gz
         slide(proxy, others, voxels, x, y, z)
-    read(proxy, x, y, z)
     if proxy.rough:
         rub(proxy, others, voxels, x, y, z)
 
@@ -219,7 +217,6 @@ def place(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) ->
         proxy.sx = proxy.gx
         proxy.sy = proxy.gy
         proxy.sz = proxy.gz
-        read(proxy, x, y, z)
 
 
 def release(proxy: Any, x: float, y: float, z: float, d: float) -> None:
@@ -259,21 +256,13 @@ def meet(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> 
     proxy.uz = nz
 
 
-def read(proxy: Any, x: float, y: float, z: float) -> None:
-    """Depth and normal of the goal, seen from the device."""
-    wx = proxy.gx - x
-    wy = proxy.gy - y
-    wz = proxy.gz - z
-    proxy.depth_m = depth_m = sqrt(wx * wx + wy * wy + wz * wz)
+def read(proxy: Any, x: float, y: float, z: float, square: float) -> None:
+    """Give out depth and normal, from the way that the device is away from the goal and its square."""
+    proxy.depth_m = depth_m = sqrt(square)
     if depth_m > 1e-12:
-        wx /= depth_m
-        wy /= depth_m
-        wz /= depth_m
+        turn_out(proxy, -x / depth_m, -y / depth_m, -z / depth_m)
     else:
-        wx = proxy.ux
-        wy = proxy.uy
-        wz = proxy.uz
-    turn_out(proxy, wx, wy, wz)
+        turn_out(proxy, proxy.ux, proxy.uy, proxy.uz)
 
 
 def turn_out(proxy: Any, x: float, y: float, z: float) -> None:

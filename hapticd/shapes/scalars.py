@@ -12,8 +12,9 @@ class ShapeScalars:
 
     `sign` is 1 for a solid and -1 for a hollow; `a`, `b`, `c`, `r` are its sides, as `hapticd.shapes.distance` takes
     them; `px` and so on its position, `xx` and so on its rotation, row by row, `turned` whether it has one. A field
-    has its first point at `ox`, `oy`, `oz`, `per_m` points a metre, `nx`, `ny`, `nz` points, its values from
-    `offset` on, and `margin` from the surface to the edge of its grid.
+    has its first point at `ox`, `oy`, `oz`, `per_m` points a metre, goes `tx`, `ty`, `tz` spacings far, has its
+    values from `offset` on, `row` and `sheet` of them between neighbours along y and x, and `margin` from the surface
+    to the edge of its grid.
     """
 
     __slots__ = ()
@@ -28,9 +29,11 @@ class ShapeScalars:
     oy: float
     oz: float
     per_m: float
-    nx: int
-    ny: int
-    nz: int
+    tx: float
+    ty: float
+    tz: float
+    row: int
+    sheet: int
     offset: int
     margin: float
     px: float
@@ -83,6 +86,7 @@ class ProxyScalars(ShapeScalars):
     first_part: int
     end_part: int
     exact: bool
+    least_m2: float
     rough: bool
     static_friction: float
     dynamic_friction: float

@@ -9,11 +9,13 @@ from math import inf, isfinite, sqrt
 
 from hapticd.errors import ConfigError
 from hapticd.shapes.distance import BOX, CAPSULE, CYLINDER, FIELD, PLANE, SPHERE, shape_distance
+from hapticd.shapes.field import Field
 from hapticd.shapes.pose import Pose, Vector
 from hapticd.shapes.scalars import PART_KINDS, PROXY_KINDS, PartScalars, ProxyScalars, Scalar
 
 KINDS = {"plane": PLANE, "sphere": SPHERE, "box": BOX, "capsule": CAPSULE, "cylinder": CYLINDER, "mesh": FIELD}
 _NO_VOXELS = array("f")
+_FINE_M2, _ROUGH_M2 = 1e-16, 4e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +30,7 @@ class Placed:
         size_m: whole sides of a box [m].
         length_m: of a cylinder from end to end; of a capsule between the centres of its ends [m].
         rounding_m: radius of the edges of a box or a cylinder [m].
+        field: the distances of a mesh.
 
     Raises:
         ConfigError: a size that is missing, too small, or not the shape's.
@@ -40,6 +43,7 @@ class Placed:
     size_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     length_m: float = 0.0
     rounding_m: float = 0.0
+    field: Field | None = None
 
     def __post_init__(self) -> None:
         if self.shape not in KINDS:
@@ -59,6 +63,10 @@ class Placed:
                 raise ConfigError(f"{name} = {value}: a {self.shape} must have a size above 0")
             if name not in takes and any(each != 0.0 for each in values):
                 raise ConfigError(f"{name} = {value}: a {self.shape} has none")
+        if (self.field is None) == (self.shape == "mesh"):
+            raise ConfigError(
+                "a mesh must have a distance field" if self.field is None else f"a {self.shape} has no field"
+            )
         if self.rounding_m != 0.0:
             if self.shape not in ("box", "cylinder"):
                 raise ConfigError(f"rounding_m = {self.rounding_m}: a {self.shape} has no edges to round")
@@ -79,12 +87,20 @@ class Placed:
         else:
             a = self.radius_m
         sign = -1.0 if self.inside else 1.0
-        return {"kind": KINDS[self.shape], "sign": sign, "a": a, "b": b, "c": c, "r": r}
+        known: dict[str, float | int | bool] = {"kind": KINDS[self.shape], "sign": sign, "a": a, "b": b, "c": c, "r": r}
+        return known if self.field is None else known | self.field.scalars()
+
+    def centre_m(self) -> Vector:
+        """Middle of the balls of `outer_m` and `inner_m`, in the frame around [m]."""
+        return self.pose.position_m if self.field is None else self.pose.point(self.field.centre_m)
 
     def outer_m(self) -> float:
-        """Radius of the ball about its position that holds the shape [m]; endless for a plane."""
+        """Radius of the ball about its centre that holds the shape [m]; endless for a plane."""
         if self.shape == "plane":
             return inf
+        if self.field is not None:
+            x, y, z = (side - 2.0 * self.field.margin_m for side in self.field.size_m)
+            return sqrt(x * x + y * y + z * z) / 2.0
         if self.shape == "box":
             x, y, z = self.size_m
             return sqrt(x * x + y * y + z * z) / 2.0
@@ -93,7 +109,7 @@ class Placed:
         return self.radius_m + self.length_m / 2.0
 
     def inner_m(self) -> float:
-        """Radius of the ball about its position that is in the shape all over [m]."""
+        """Radius of a ball about its centre that is in the shape all over [m]; 0 when none is known."""
         if self.shape == "box":
             return min(self.size_m) / 2.0
         if self.shape == "cylinder":
@@ -106,9 +122,10 @@ class Part(PartScalars):
 
     __slots__ = tuple(PART_KINDS)
 
-    def __init__(self, placed: Placed, pose: Pose) -> None:
-        _fill(self, PART_KINDS, placed, pose)
-        self.bound_x, self.bound_y, self.bound_z = pose.position_m
+    def __init__(self, placed: Placed, around: Pose) -> None:
+        """Put a shape into the frame of a pose."""
+        _fill(self, PART_KINDS, placed, placed.pose.seen_from(around))
+        self.bound_x, self.bound_y, self.bound_z = around.own(placed.centre_m())
         outer_m = placed.outer_m()
         self.bound_m = -1.0 if placed.inside or outer_m == inf else outer_m
 
@@ -147,11 +164,13 @@ class Proxy(ProxyScalars):
         self.shapes = tuple(shapes)
         self.margin_m = margin_m
         _fill(self, PROXY_KINDS, first, first.pose)
-        self.others = tuple(Part(other, other.pose.seen_from(first.pose)) for other in shapes[1:])
-        self.voxels = _NO_VOXELS
+        self.others = tuple(Part(other, first.pose) for other in shapes[1:])
+        self.voxels = _voxels(shapes, (self, *self.others))
         self.first_part = 0
         self.end_part = len(self.others)
         self.exact = not self.others and first.shape != "mesh"
+        # A field's normal is off by more than what a slide leaves: sooner done.
+        self.least_m2 = _ROUGH_M2 if any(shape.field for shape in shapes) else _FINE_M2
         self.static_friction = static_friction
         self.dynamic_friction = dynamic_friction
         self.rough = static_friction > 0.0
@@ -172,7 +191,8 @@ class Proxy(ProxyScalars):
     def _bound(self, pose: Pose) -> None:
         """Set the half space or ball out of which nothing is touched."""
         first = self.shapes[0]
-        x, y, z = pose.position_m
+        own = first.pose.own(first.centre_m())
+        x, y, z = pose.point(own)
         margin_m = self.margin_m
         self.reach_x = self.reach_y = self.reach_z = self.reach_w = 0.0
         self.reach_limit = inf
@@ -188,7 +208,8 @@ class Proxy(ProxyScalars):
         else:
             outer_m = first.outer_m()
             for part, placed in zip(self.others, self.shapes[1:], strict=True):
-                far = sqrt(part.bound_x * part.bound_x + part.bound_y * part.bound_y + part.bound_z * part.bound_z)
+                way = (part.bound_x - own[0], part.bound_y - own[1], part.bound_z - own[2])
+                far = sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
                 outer_m = max(outer_m, inf if placed.inside else far + placed.outer_m())
             if first.inside or outer_m == inf:
                 return
@@ -224,8 +245,22 @@ def _clear(one: Placed, two: Placed) -> bool:
     if outer_m == inf:
         return False
     part = Part(two, two.pose)
-    d, _, _, _ = shape_distance(part, _NO_VOXELS, *two.pose.own(one.pose.position_m))
-    return d >= outer_m
+    voxels = _NO_VOXELS if two.field is None else two.field.distances_m
+    d, _, _, _ = shape_distance(part, voxels, *two.pose.own(one.centre_m()))
+    return d >= outer_m + (0.0 if two.field is None else two.field.error_m)
+
+
+def _voxels(shapes: Sequence[Placed], targets: Sequence[Part | Proxy]) -> array[float]:
+    """The distances of all fields, and in each shape where its own begin."""
+    fields = [shape.field for shape in shapes if shape.field is not None]
+    if len(fields) == 1:
+        return fields[0].distances_m
+    voxels = array("f")
+    for shape, target in zip(shapes, targets, strict=True):
+        if shape.field is not None:
+            target.offset = len(voxels)
+            voxels.extend(shape.field.distances_m)
+    return voxels
 
 
 def _fill(target: Part | Proxy, kinds: dict[str, Scalar], placed: Placed, pose: Pose) -> None:

@@ -42,11 +42,11 @@ def records(proxy: Proxy) -> tuple[Any, Any]:
 @pytest.mark.parametrize("name", SOLIDS)
 @pytest.mark.parametrize("friction", [(0.0, 0.0), (0.6, 0.4)])
 def test_compiled_and_interpreted_proxies_are_bitwise_equal(name: str, friction: tuple[float, float]) -> None:
-    voxels = np.zeros(1)
     proxy = Proxy(SOLIDS[name], *friction)
+    voxels = np.array(proxy.voxels or [0.0], float)  # as numbers of 64 bits, which the loop reads them as
     one, others = records(proxy)
     touched = 0
-    for at, now in enumerate(walk(proxy, 7, 1500, 0.5)):
+    for at, now in enumerate(walk(proxy, 7, 500, 0.5)):
         if at == 0:
             one, others = records(proxy)
             continue
@@ -54,4 +54,4 @@ def test_compiled_and_interpreted_proxies_are_bitwise_equal(name: str, friction:
         touched += proxy.touching
         for field in PROXY_KINDS:
             assert one[0][field] == getattr(proxy, field), (at, field)
-    assert touched > 30
+    assert touched > 10

