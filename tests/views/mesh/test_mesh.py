@@ -98,8 +98,8 @@ def test_what_the_tick_reads_is_what_was_sampled(tmp_path: Path, capsys: pytest.
 
 
 def test_a_pressed_mesh_pushes_back_like_the_shape_it_is_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = saved(tmp_path, ball(5))
-    assert run(capsys, path, "--voxel", 0.002)[0] == 0
+    path = saved(tmp_path, ball(4))
+    assert run(capsys, path, "--voxel", 0.0025)[0] == 0
     field = Field.unpack(path.with_suffix(".field").read_bytes())
     proxy = Proxy([Placed("mesh", Pose.of((0.1, 0.0, 0.0), (0.3, 0.1, 0.5, 0.2)), field=field)])
     rng = np.random.default_rng(5)
@@ -108,7 +108,7 @@ def test_a_pressed_mesh_pushes_back_like_the_shape_it_is_of(tmp_path: Path, caps
         u /= np.linalg.norm(u)
         for r in (0.032, 0.0298, 0.029):
             (stand if r > RADIUS_M else go)(proxy, (0.1 + r * u[0], r * u[1], r * u[2]))
-        assert np.linalg.norm(spring(proxy)) == pytest.approx(1e-3, abs=field.error_m + 2e-5)
+        assert np.linalg.norm(spring(proxy)) == pytest.approx(1e-3, abs=field.error_m + 1e-4)
         assert np.dot(spring(proxy), u) / np.linalg.norm(spring(proxy)) > 0.998  # 3.6 degrees
 
 
