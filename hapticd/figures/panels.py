@@ -123,7 +123,7 @@ def lateness(axes: Axes, runs: Sequence[Curves]) -> None:
             continue
         late_us = np.maximum(run["late_us"], 0.0)
         share = np.histogram(late_us, edges)[0] / len(late_us)
-        label = f"{'' if len(runs) == 1 else run.name + ': '}99.9 % below {np.quantile(late_us, 0.999):.3g} µs"
+        label = f"{'' if len(runs) == 1 else run.name + ': '}99.9 % below {np.quantile(late_us, 0.999):.0f} µs"
         axes.stairs(share, np.maximum(edges, 0.8), **hand(at), linewidth=1.1, label=label)
         axes.plot(late_us.max(), 1.0 / len(late_us), marker="o", markersize=3.4, color=hand(at)["color"])
     axes.set_xscale("log")

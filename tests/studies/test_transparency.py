@@ -16,11 +16,11 @@ import pytest
 from hapticd.cli import main
 from hapticd.config.loading import parse
 from hapticd.config.models import WallConfig
+from hapticd.offline.felt import felt_index, threshold_m
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.simulate import simulate
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.boundaries import Loop, stable_limit
-from hapticd_studies.felt import felt_index, threshold_m
 from hapticd_studies.law_spec import LawSpec, parse_laws
 from hapticd_studies.transparency import references, scores
 from hapticd_studies.transparency.devices import Held, draw

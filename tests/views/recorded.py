@@ -50,7 +50,7 @@ def write_recording(
         wall_stiffness_n_per_m=(run.stiffness_n_per_m,),
         version="0.2.0",
     )
-    file = RecordingFile(path)
+    file = RecordingFile(path, overwrite=True)
     told = make_receipt(status, {"config_text": text, "config_file": "/etc/lab.toml", "kernel": "6.1.0"})
     file.describe(METADATA, as_texts({**told, **(receipt or {})}))
     outward = 1.0 if wall.free_side == "positive" else -1.0

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import hapticd
+from hapticd.cli import main
 from hapticd.errors import HapticdError
 from hapticd.offline.run import Run
 from hapticd_views.source import Source, open_source
@@ -118,14 +119,19 @@ def test_a_running_daemon_is_drawn_as_it_goes(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_asked_for_wrongly_is_said_in_one_line(
-    arguments: list[str], said: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arguments: list[str],
+    said: str,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    arguments = [str(folder / one) if one == "run.csv" else one for one in arguments]
-    done = plot(*arguments)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"hapticd: {said}")
-    assert len(done.stderr.splitlines()) == 1
+    with pytest.raises(SystemExit) as ended:
+        main(["plot", *(str(folder / one) if one == "run.csv" else one for one in arguments)])
+    assert ended.value.code == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith(f"hapticd: {said}")
 
 
 @pytest.mark.parametrize(

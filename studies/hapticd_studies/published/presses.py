@@ -8,11 +8,11 @@ import numpy as np
 
 from hapticd import plugins
 from hapticd.config.models import WallConfig
+from hapticd.offline.felt import WINDOW_S, felt_index
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import aimed, judge
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point
 from hapticd.simulation.options import SimulationOptions
-from hapticd_studies.felt import WINDOW_S, felt_index
 
 HIGHEST_START_M = 2e-3
 _POSITION = TRACE_COLUMNS.index("x_m")

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hapticd.law import state_fields
+from hapticd.offline.felt import MOVING_HZ, WINDOW_S, felt_index
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.simulation.batch import Batch, BatchResult, Point
-from hapticd_studies.felt import MOVING_HZ, WINDOW_S, felt_index
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.transparency import arrivals, scores
 from hapticd_studies.transparency.arrivals import GENTLE, HARD, Arrival

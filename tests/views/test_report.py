@@ -1,0 +1,260 @@
+"""`hapticd report`: a verdict that the studies would give, and a page that nothing in a recording can take over."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import hapticd
+from hapticd.figures.curves import Curves
+from hapticd.offline.outcome import Outcome
+from hapticd.offline.run import Run
+from hapticd.telemetry.records import Event, Status
+from hapticd_views.recording.messages import Note, RecordedGap
+from hapticd_views.report.page import MOST_LINES, page
+from hapticd_views.report.stability import judge
+from hapticd_views.report.statement import Statement, statements
+from hapticd_views.report.timeline import timeline
+from hapticd_views.source import Source, open_source
+from tests.daemon.running import HAPTICD
+from tests.views.recorded import EPOCH_S, write_recording
+
+CONFIG = Path(__file__).parent.parent.parent / "config"
+NEED_THEIR_DEVICE = {"hid-rig", "omega7", "serial-rig"}
+SHIPPED = sorted(file for file in CONFIG.glob("*.toml") if file.stem not in NEED_THEIR_DEVICE)
+WALL = CONFIG / "wall-12-energy-cycle.toml"
+HOSTILE = '</td><script>alert("1")</script><img src=x onerror=alert(2)>&lt;b&gt;\x00\x1b[31m\u202e\ud800 end'
+
+
+def recorded(tmp_path: Path, run: Run, config: Path = WALL, **more: Any) -> Source:
+    return open_source(write_recording(tmp_path / f"{config.stem}.mcap", run, config.read_text(), **more))
+
+
+def answer(told: list[Statement], question: str) -> Statement:
+    return next(one for one in told if one.question.startswith(question))
+
+
+@pytest.fixture(scope="module")
+def still() -> Run:
+    return hapticd.simulate(WALL, 3.0)
+
+
+# -- was it stable?
+
+
+@pytest.mark.parametrize("config", SHIPPED, ids=lambda config: config.stem)
+def test_the_verdict_is_that_of_the_studies_which_know_hand_and_true_position(config: Path, tmp_path: Path) -> None:
+    run = hapticd.simulate(config, 5.0)
+    told = answer(statements(recorded(tmp_path, run, config)), "Was it stable")
+    assert told.mark == ("bad" if run.outcome is Outcome.MOVING else "good")
+    assert told.text.startswith("Unstable" if run.outcome is Outcome.MOVING else "Stable")
+    assert judge(run.curves).stable is (told.mark == "good"), "the true position says the same"
+
+
+def shaken(**pieces: float) -> Curves:
+    """A device held at 0.5 mm for 4 s, that shakes from `begin` to `end` by `span_m` peak to peak at `hz`."""
+    time_s = np.arange(4000) * 1e-3
+    on = (time_s >= pieces["begin"]) & (time_s < pieces["end"])
+    x_m = -5e-4 + np.where(on, 0.5 * pieces["span_m"] * np.sin(2.0 * np.pi * pieces["hz"] * time_s), 0.0)
+    return Curves("shaken", {"t_s": time_s, "x_m": x_m, "force_n": -12e3 * x_m, "in_contact": x_m < 0.0}, 12e3)
+
+
+def test_what_shakes_is_measured() -> None:
+    found = judge(shaken(begin=2.0, end=3.0, span_m=4e-4, hz=40.0))
+    assert not found.stable
+    assert found.worst_hz == pytest.approx(40.0, abs=2.0)
+    assert found.worst_m == pytest.approx(4e-4, rel=0.1)
+    assert found.held_s == pytest.approx(3.5)
+    assert found.shaking_s == pytest.approx(1.0)
+
+
+def test_a_device_may_ring_when_it_arrives_and_a_hand_may_move() -> None:
+    assert judge(shaken(begin=0.0, end=1.4, span_m=4e-4, hz=40.0)).ringing_s == pytest.approx(1.5)
+    assert judge(shaken(begin=0.0, end=1.4, span_m=4e-4, hz=40.0)).stable
+    assert judge(shaken(begin=0.0, end=4.0, span_m=4e-4, hz=2.0)).stable
+
+
+def test_shaking_within_the_criterion_is_still_and_felt_or_not() -> None:
+    fine = judge(shaken(begin=0.0, end=4.0, span_m=2e-6, hz=237.0))
+    assert fine.stable
+    assert fine.felt > 5.0
+    assert "felt index" in fine.words
+    assert judge(shaken(begin=0.0, end=0.0, span_m=0.0, hz=1.0)).felt <= 1.0
+
+
+def test_a_tap_is_not_judged() -> None:
+    tap = shaken(begin=0.0, end=0.0, span_m=0.0, hz=1.0)
+    outside = np.where(tap["t_s"] % 0.6 < 0.3, tap["x_m"], 1e-3)
+    found = judge(replace(tap, columns={**tap.columns, "x_m": outside, "in_contact": outside < 0.0}))
+    assert not found.judged
+    assert found.words.startswith("Not judged: it never stayed at the wall for 1 s")
+
+
+def test_bouncing_out_of_the_wall_is_no_end_of_the_touch() -> None:
+    assert not judge(shaken(begin=0.0, end=4.0, span_m=2e-3, hz=30.0)).stable
+
+
+# -- law, machine, faults
+
+
+def test_what_the_law_added_is_what_the_books_say(tmp_path: Path, still: Run) -> None:
+    law = answer(statements(recorded(tmp_path, still)), "What did the law")
+    share = (still.ticks - 1) / still.ticks
+    assert law.numbers["generated_j"] == pytest.approx(still.generated_j * share)
+    assert law.numbers["dissipated_j"] == pytest.approx(still.dissipated_j * share)
+    inside = still.in_contact
+    assert law.numbers["damping_max_n_s_per_m"] == still.damping_n_s_per_m[inside].max()
+    assert law.numbers["displayed_stiffness_n_per_m"] == pytest.approx(12e3, rel=0.05)
+    assert "of 12 kN/m" in law.text
+
+
+def test_what_the_machine_did_is_counted(tmp_path: Path, still: Run) -> None:
+    late_us = np.full(still.ticks, 12.0)
+    late_us[17] = 4321.0
+    status = [Status(timestamp=EPOCH_S + at, seq=0, overruns=count) for at, count in ((0.5, 5), (1.5, 9))]
+    gap = RecordedGap(EPOCH_S + 0.3, "hapticd/position", 299, 340, 40)
+    source = recorded(tmp_path, still, late_us=late_us, more=[gap, *status], left_out=range(300, 340))
+    machine = answer(statements(source), "What did the machine")
+    assert machine.mark == "bad"
+    assert machine.numbers["late_max_us"] == 4321.0
+    assert machine.numbers["late_median_us"] == 12.0
+    assert (machine.numbers["overruns"], machine.numbers["missing"]) == (4.0, 40)
+    assert "40 ticks are missing" in machine.text
+    good = answer(statements(recorded(tmp_path, still)), "What did the machine")
+    assert good.mark == "good"
+    assert "No tick is missing" in good.text
+
+
+def test_a_fault_is_named_with_its_time(tmp_path: Path, still: Run) -> None:
+    fault = Event(EPOCH_S + 1.25, 1250, 201, "over-speed: 3 m/s", {})
+    told = statements(recorded(tmp_path, still, more=[fault]))
+    assert answer(told, "Was there a fault").mark == "bad"
+    assert answer(told, "Was there a fault").text == "One at 1.25 s: over-speed: 3 m/s (code 201)."
+    assert answer(statements(recorded(tmp_path, still)), "Was there a fault").text == "None."
+
+
+def test_what_happened_is_told_in_order_of_time(tmp_path: Path, still: Run) -> None:
+    more = [
+        Note(EPOCH_S + 2.0, "recording stopped"),
+        Event(EPOCH_S + 0.5, 500, 111, "go", {}),
+        Event(EPOCH_S + 1.5, 1500, 204, "lost", {}),
+        Event(EPOCH_S + 1.0, 1000, 103, "none -> tdpa", {}),
+    ]
+    recording = recorded(tmp_path, still, more=more).recording
+    assert recording is not None
+    assert [(one.time_s, one.kind, one.text) for one in timeline(recording)] == [
+        (0.5, "marker", "go"),
+        (1.0, "event", "none -> tdpa (code 103)"),
+        (1.5, "fault", "lost (code 204)"),
+        (2.0, "recorder", "recording stopped"),
+    ]
+
+
+# -- the page
+
+
+class Seen(HTMLParser):
+    """Tags, attributes and texts as a browser would take them."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+        self.text = ""
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(name, value or "") for name, value in attrs]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def shown(source: Source) -> Seen:
+    return Seen(page(source, statements(source)).decode())
+
+
+def test_hostile_texts_of_a_recording_stay_texts(tmp_path: Path, still: Run) -> None:
+    receipt = dict.fromkeys(("device", "law", "kernel", "config_file", "serial"), HOSTILE)
+    told = HOSTILE.replace("\ud800", "")  # what cannot be encoded never gets into a recording
+    more: list[Event | Note] = [
+        Event(EPOCH_S + 1.0, 1000, 201, told, {}),
+        Event(EPOCH_S + 1.1, 1100, 111, told, {}),
+        Note(EPOCH_S + 1.2, told),
+    ]
+    receipt = {key: text.replace("\ud800", "").replace("\x00", "") for key, text in receipt.items()}
+    config = WALL.read_text() + '\n# </pre><script src="http://127.0.0.1/x.js"></script>\n'
+    path = write_recording(tmp_path / "<b>&x.mcap", still, config, more=more, receipt=receipt)
+    seen = shown(open_source(path))
+    plain = Seen(page(recorded(tmp_path, still), statements(recorded(tmp_path, still))).decode())
+    assert set(seen.tags) <= set(plain.tags) | {"tr", "th"}, "a tag that no page has came from the recording"
+    assert seen.text.count('</td><script>alert("1")</script><img src=x onerror=alert(2)>&lt;b&gt;') >= 8
+    assert not re.search("[\x00\x1b\u202e]", seen.text)
+    assert "<b>&x.mcap" in seen.text
+    assert '</pre><script src="http://127.0.0.1/x.js"></script>' in seen.text
+
+
+def test_the_page_holds_everything_and_asks_for_nothing(tmp_path: Path, still: Run) -> None:
+    seen = shown(recorded(tmp_path, still))
+    assert not {"script", "link", "iframe", "object", "embed", "form", "base", "svg"} & set(seen.tags)
+    assert not [name for name, _ in seen.attributes if name.startswith("on") or name in ("href", "srcset", "style")]
+    sources = [value for name, value in seen.attributes if name == "src"]
+    assert len(sources) == 4
+    for one in sources:
+        head, _, content = one.partition(",")
+        assert head == "data:image/svg+xml;base64"
+        drawn = ElementTree.fromstring(base64.b64decode(content))
+        references = [value for each in drawn.iter() for key, value in each.attrib.items() if key.endswith("href")]
+        assert all(value.startswith(("#", "data:")) for value in references)
+        assert not [each for each in drawn.iter() if each.tag.endswith("script")]
+    policy = next(value for _, value in seen.attributes if value.startswith("default-src"))
+    assert policy == "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    assert "url(" not in page(recorded(tmp_path, still), []).decode()
+
+
+def test_the_page_is_its_own_receipt(tmp_path: Path, still: Run) -> None:
+    seen = shown(recorded(tmp_path, still))
+    assert WALL.read_text().strip() in seen.text
+    for said in ("6.1.0", "energy-cycle", "loopback", "/etc/lab.toml", "wall_stiffness_n_per_m12000.0"):
+        assert said in seen.text
+
+
+def test_a_thousand_events_do_not_make_an_endless_page(tmp_path: Path, still: Run) -> None:
+    many = [Event(EPOCH_S + at * 1e-3, at, 103, f"event {at}", {}) for at in range(MOST_LINES + 7)]
+    assert "7 more are in the recording." in shown(recorded(tmp_path, still, more=many)).text
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.npz"])
+def test_a_simulated_run_has_its_report_too(name: str, tmp_path: Path) -> None:
+    config = CONFIG / "wall-12-none.toml"
+    command = [HAPTICD, "simulate", "--config", str(config), "--duration", "3", "--output", str(tmp_path / name)]
+    subprocess.run(command, check=True, capture_output=True)
+    output = tmp_path / "run.html"
+    command = [HAPTICD, "report", str(tmp_path / name), "--output", str(output)]
+    done = subprocess.run([*command, "--json"], check=True, capture_output=True, text=True)
+    told = json.loads(done.stdout)["statements"]
+    assert [one["mark"] for one in told] == ["bad", "good"]
+    assert told[0]["numbers"]["worst_hz"] == pytest.approx(28.0, abs=3.0)
+    assert "a file of hapticd simulate holds the columns alone" in Seen(output.read_text()).text
+    again = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert (again.returncode, again.stderr) == (2, f"hapticd: {output}: exists; add --overwrite to replace it\n")
+
+
+def test_the_command_says_the_verdict_without_a_page(tmp_path: Path, still: Run) -> None:
+    path = write_recording(tmp_path / "run.mcap", still, WALL.read_text())
+    done = subprocess.run([HAPTICD, "report", str(path)], check=True, capture_output=True, text=True)
+    assert done.stdout.startswith("Was it stable? Stable: 2.5 s at the wall without shaking by more than 0.05 mm")
+    assert [line.split("?")[0] for line in done.stdout.splitlines()] == [
+        "Was it stable", "What did the law add", "Was there a fault", "What did the machine do",
+    ]  # fmt: skip
