@@ -123,7 +123,8 @@ class DaemonClient(Client):
     def receipt(self) -> dict[str, Any]:
         """What a recording of this daemon says of itself.
 
-        The keys of `hapticd/status`, and config_text, kernel, machine and python of the daemon's side.
+        The keys of `hapticd/status`; config_text; device_info, the fields of `DeviceInfo`; kernel, machine and python
+        of the daemon's side.
         """
         found: dict[str, Any] = self._ask("receipt")["receipt"]
         return found

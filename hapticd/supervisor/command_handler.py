@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from hapticd.faults.record import machine
@@ -67,6 +67,7 @@ class CommandHandler:
             **state.status.made.as_map(),
             "config_hash": state.config.hash,
             "config_text": state.config.text,
+            "device_info": asdict(state.loop.info),
             **machine(),
         }
 

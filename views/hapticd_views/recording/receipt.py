@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,7 +18,7 @@ from hapticd.version import __version__
 METADATA = "hapticd receipt"
 """Name of the metadata record."""
 
-_JSON = {field.name for field in dataclasses.fields(Status) if field.type != "str"}
+_JSON = {"device_info"} | {field.name for field in dataclasses.fields(Status) if field.type != "str"}
 _COUNTS = (
     "seq", "measured_rate_hz", "ticks", "overruns", "late_histogram", "late_max_us", "busy_max_us", "ring_drops",
     "event_drops", "next_try_timestamp",
@@ -45,7 +46,9 @@ def make_receipt(status: Status, asked: Mapping[str, Any] | HapticdError) -> dic
 
 def as_texts(receipt: Mapping[str, Any]) -> dict[str, str]:
     """A receipt as the texts of a metadata record."""
-    return {key: json.dumps(value, default=str) if key in _JSON else str(value) for key, value in receipt.items()}
+    return {
+        key: json.dumps(_finite(value), default=str) if key in _JSON else str(value) for key, value in receipt.items()
+    }
 
 
 def from_texts(texts: Mapping[str, str]) -> dict[str, Any]:
@@ -55,3 +58,12 @@ def from_texts(texts: Mapping[str, str]) -> dict[str, Any]:
         ValueError: they are of none.
     """
     return {key: json.loads(text) if key in _JSON else text for key, text in texts.items()}
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no infinity: a limit that is not there is null."""
+    if isinstance(value, Mapping):
+        return {str(key): _finite(element) for key, element in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(element) for element in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,1 @@
+"""A recorded hand under other laws: `hapticd simulate --replay`. docs/replay.md."""

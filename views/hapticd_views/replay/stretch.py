@@ -1,0 +1,111 @@
+"""The part of a recording that is replayed: the longest one without a gap, a restart or a change of configuration."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.device import DeviceInfo
+from hapticd.errors import HapticdError
+from hapticd_views.recording import Recording
+
+_FAR_M = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Ticks one after the other.
+
+    Attributes:
+        ticks: columns as `Recording.ticks` has them.
+        receipt: what was in force.
+        first_s: from the first tick of the recording to its first one [s].
+        in_contact: whether it begins inside a wall, for want of a tick outside.
+    """
+
+    ticks: dict[str, Any]
+    receipt: dict[str, Any]
+    first_s: float
+    in_contact: bool
+
+    def __len__(self) -> int:
+        return len(self.ticks["seq"])
+
+    @property
+    def config(self) -> LoadedConfig:
+        """The configuration that was in force.
+
+        Raises:
+            HapticdError: it is not in the recording.
+            ConfigError: this installation cannot use it.
+        """
+        if not self.receipt["config_text"]:
+            raise HapticdError(
+                f"the recording has no configuration ({self.receipt['config_missing']}): name a --config"
+            )
+        return parse(self.receipt["config_text"], "recorded configuration")
+
+    @property
+    def info(self) -> DeviceInfo:
+        """What the device declared of itself, as far as the recording has it."""
+        told = self.receipt.get("device_info") or {}
+        known = {field.name for field in dataclasses.fields(DeviceInfo)}
+        fields = {key: value for key, value in told.items() if key in known}
+        axes = tuple(self.receipt["axes"])
+        fields |= {
+            "model": self.receipt["device"],
+            "serial": self.receipt["serial"],
+            "axes": axes,
+            "simulated": self.receipt["simulated"],
+            "max_force_n": fields.get("max_force_n") or self.receipt["max_force_n"] or math.inf,
+            "resolution_m": fields.get("resolution_m", 0.0),
+            "workspace_m": ((-_FAR_M, _FAR_M),) * len(axes),  # what was recorded was possible
+            "nominal_rate_hz": fields.get("nominal_rate_hz", self.receipt["rate_hz"]),
+            "safe_damping_n_s_per_m": fields.get("safe_damping_n_s_per_m", 1.0),
+            "host_silence_ms": fields.get("host_silence_ms"),
+            "notes": (),
+        }
+        return DeviceInfo(**fields)
+
+
+def longest_stretch(recording: Recording, most_s: float | None = None) -> Stretch:
+    """The part to replay; it begins outside of all walls where it can.
+
+    Args:
+        recording: of position, damping and timing at least.
+        most_s: how much of it at most [s].
+
+    Raises:
+        HapticdError: there is nothing to replay.
+    """
+    if recording.receipt["every_ticks"] != 1:
+        raise HapticdError(f"{recording.path}: only one tick in {recording.receipt['every_ticks']} was published")
+    for needed in ("position", "damping", "timing"):
+        if needed not in recording.topics:
+            raise HapticdError(f"{recording.path}: has no topic {needed!r}, which a replay needs")
+    ticks = recording.ticks
+    if len(ticks["seq"]) < 2:
+        raise HapticdError(f"{recording.path}: has no ticks to replay")
+    receipts = sorted(recording.receipts, key=lambda receipt: float(receipt["timestamp"]))
+    since = np.array([receipt["timestamp"] for receipt in receipts[1:]])
+    in_force: Any = np.searchsorted(since, ticks["timestamp"], side="right")
+    breaks = (np.diff(ticks["seq"]) != 1) | (np.diff(ticks["run"]) != 0) | (np.diff(in_force) != 0)
+    edges = [0, *(np.nonzero(breaks)[0] + 1).tolist(), len(ticks["seq"])]
+    start, end = max(pairwise(edges), key=lambda span: span[1] - span[0])
+    free = np.nonzero(~ticks["in_contact"][start:end].any(axis=1))[0]
+    inside = not len(free) or start + int(free[0]) > end - 2
+    start += 0 if inside else int(free[0])
+    if most_s is not None:
+        end = min(end, start + max(2, 1 + round(most_s * recording.receipt["rate_hz"])))
+    return Stretch(
+        ticks={name: column[start:end] for name, column in ticks.items()},
+        receipt=receipts[int(in_force[start])],
+        first_s=float(ticks["timestamp"][start] - ticks["timestamp"][0]),
+        in_contact=inside,
+    )
