@@ -105,8 +105,8 @@ def score(trace: Trace, recorded: Trace, period_s: float) -> Score:
     )
 
 
-def table(scores: Sequence[Score]) -> list[str]:
-    """The scores for people, a line a law."""
+def table(scores: Sequence[Score], digits: int = 4) -> list[str]:
+    """The scores for people, a line a law, numbers with this many digits."""
     rows = [
         ["law", "depth", "shaking", "peak force", "stiffness", "made", "taken", "damping", "off", "off"],
         ["", "mm", "um", "N", "N/m", "mJ", "mJ", "N s/m", "N", "mm"],
@@ -117,23 +117,17 @@ def table(scores: Sequence[Score]) -> list[str]:
             (one.generated_j, 1e3), (one.dissipated_j, 1e3), (one.damping_n_s_per_m, 1.0), (one.force_off_n, 1.0),
             (one.position_off_m, 1e3),
         )  # fmt: skip
-        rows.append([one.law, *(_shown(value * scale) for value, scale in values)])
+        rows.append([one.law, *(_shown(value * scale, digits) for value, scale in values)])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
-        first, *others = (
-            text.ljust(width) if not at else text.rjust(width) for at, (text, width) in _placed(row, widths)
-        )
-        lines.append("  ".join([first, *others]).rstrip())
+        others = map(str.rjust, row[1:], widths[1:])
+        lines.append("  ".join([row[0].ljust(widths[0]), *others]).rstrip())
     return [*lines, *(f"{one.law}: would have stopped: {one.fault}" for one in scores if one.fault)]
 
 
-def _placed(row: Sequence[str], widths: Sequence[int]) -> list[tuple[int, tuple[str, int]]]:
-    return list(enumerate(zip(row, widths, strict=True)))
-
-
-def _shown(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.4g}"
+def _shown(value: float, digits: int) -> str:
+    return "-" if math.isnan(value) else f"{value:.{digits}g}"
 
 
 def _rms(values: Any) -> float:
