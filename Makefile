@@ -13,7 +13,7 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check -
 # What tests and examples use besides Python; one list for this file, CI and the README.
 PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd-container debootstrap \
     umockdev libumockdev-dev libusb-1.0-0 valgrind iproute2 gcc-avr avr-libc libsimavr-dev clang libclang-rt-dev \
-    strace
+    strace chromium $(if $(shell command -v npm 2>/dev/null),,npm)
 
 # Where `make install` puts the program: a directory of its own, which `make uninstall` removes.
 PREFIX ?= /opt/hapticd
@@ -25,12 +25,13 @@ SERVICE_EXTRAS := metrics
 PLACE = $(DESTDIR)$(PREFIX)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint nightly bench packages clean install uninstall own-place deb
+.PHONY: help run test lint web nightly bench packages clean install uninstall own-place deb
 
 help:
 	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
 	@echo "make test     everything that CI checks"
 	@echo "make lint     formatting, style, types and import rules only"
+	@echo "make web      uPlot for hapticd dashboard, by npm, in the version and with the hash that views/ names"
 	@echo "make nightly  the long runs: every shipped configuration, every property on many examples"
 	@echo "make bench    how long a tick takes on this machine"
 	@echo "make install  the daemon as a system service (as root); PREFIX=$(PREFIX), DESTDIR for packages"
@@ -43,7 +44,7 @@ run: $(READY_RUN)
 
 # Most of the time is spent waiting for daemons that run in real time, so more workers than the two processors of CI; but
 # with four, real-time loops, their supervisors and compilers hold each other up too often.
-test: packages lint
+test: packages lint web
 	$(BIN)/pytest --numprocesses 3 --dist loadfile --max-worker-restart 0
 
 lint: $(READY)
@@ -52,7 +53,21 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-nightly: packages $(READY)
+# What the page of hapticd dashboard takes from others; served as it is, so that a browser fetches nothing elsewhere.
+UPLOT := views/node_modules/uplot
+PAGE_VENDOR := views/hapticd_views/dashboard/page/vendor
+web: $(PAGE_VENDOR)/uPlot.esm.js
+
+$(PAGE_VENDOR)/uPlot.esm.js: views/package.json views/package-lock.json
+	@command -v npm >/dev/null || .ci/packages npm
+	npm ci --prefix views --ignore-scripts --no-audit --no-fund
+	mkdir -p $(PAGE_VENDOR)
+	cp $(UPLOT)/dist/uPlot.min.css $(PAGE_VENDOR)/
+	cp $(UPLOT)/LICENSE $(PAGE_VENDOR)/uPlot.LICENSE
+	cp $(UPLOT)/dist/uPlot.esm.js $(PAGE_VENDOR)/
+	@touch $@
+
+nightly: packages web $(READY)
 	$(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
 
@@ -102,5 +117,5 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 clean:
-	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build dist views/node_modules $(PAGE_VENDOR) .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +

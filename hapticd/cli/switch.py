@@ -12,6 +12,7 @@ import typer
 
 from hapticd.cli.remote import Instance
 from hapticd.client.commands import RefusedConfigError, command
+from hapticd.client.edited import put_into_force
 from hapticd.config.editing import with_law
 from hapticd.config.file import read, replace
 from hapticd.config.models import ControllerConfig
@@ -50,11 +51,12 @@ def switch(
     if dry_run:
         typer.echo("".join(_difference(before, after, str(path))), nl=False)
         return
-    if after != before:
+    ours = running is not None and _same(path, running)
+    if after != before and not ours:
         replace(path, after)
     if running is None:
         outcome = f"no daemon {instance!r} runs; it has effect at its next start"
-    elif not _same(path, running):
+    elif not ours:
         outcome = f"daemon {instance!r} runs {running} and goes on with that"
     else:
         _take_over(path, before, after, instance)
@@ -96,10 +98,9 @@ def _same(path: Path, other: Path) -> bool:
 
 def _take_over(path: Path, before: str, after: str, instance: str) -> None:
     try:
-        command("reload", instance, wait=True)
+        put_into_force(path, before, after, instance)
     except RefusedConfigError:
-        if after != before and read(path) == after:  # it was not edited again since
-            replace(path, before)
+        if after != before and read(path) == before:
             typer.echo(f"{path}: refused by the daemon; the file is as it was", err=True)
         raise
 

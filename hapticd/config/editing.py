@@ -1,8 +1,10 @@
-"""Put another law into the text of a configuration; all else stays as its author wrote it, comments included."""
+"""Put another law or other values into the text of a configuration; all else stays as its author wrote it."""
 
 from __future__ import annotations
 
+import re
 import tomllib
+from collections.abc import Mapping
 from typing import Any
 
 import tomlkit
@@ -11,6 +13,7 @@ from tomlkit.items import Comment, InlineTable, Null, Table, Whitespace
 
 from hapticd.config.loading import parse
 from hapticd.config.models import ControllerConfig
+from hapticd.config.values import put
 from hapticd.errors import ConfigError
 
 _BOM = "\ufeff"
@@ -62,8 +65,74 @@ def with_law(text: str, name: str, law: str, params: dict[str, Any]) -> str:
     return mark + edited
 
 
-def _by_hand(name: str) -> ConfigError:
-    return ConfigError(f"{name}: [controller] is written in a way that only a person can edit")
+def with_edits(text: str, name: str, values: Mapping[str, Any]) -> str:
+    """The text with other values, comments and layout kept. What the values mean is not looked at: `parse` does that.
+
+    Args:
+        text: TOML.
+        name: what to call it in errors, usually its path.
+        values: by key, such as `safety.max_force_n` or `scene.walls[0].stiffness_n_per_m`; None takes the key out.
+
+    Raises:
+        ConfigError: the text is no TOML, a key has no place in it, or only a person can edit it.
+    """
+    if not values:
+        return text
+    mark = _BOM if text.startswith(_BOM) else ""
+    text = text.removeprefix(_BOM)
+    try:
+        data = tomllib.loads(f"{text}\n")
+        document: Any = tomlkit.parse(text)
+    except (ValueError, RecursionError):
+        parse(text, name)  # says where
+        raise
+    for key, value in values.items():
+        _set(data, key, value, name)
+        try:
+            _set(document, key, value, name)
+        except ConfigError:
+            raise
+        except Exception:  # noqa: BLE001 - tomlkit's book-keeping breaks on some mixtures of tables
+            raise _by_hand(name, key) from None
+    edited = tomlkit.dumps(document)
+    try:
+        if tomllib.loads(edited) == data:
+            return mark + edited
+    except ValueError:
+        pass
+    raise _by_hand(name, ", ".join(values))
+
+
+def _set(data: Any, key: str, value: Any, name: str) -> None:
+    """Put a value under a dotted key, or take the key out; it comes behind the last key of its table."""
+    owner, _, last = key.rpartition(".")
+    if last.endswith("]"):
+        raise ConfigError(f"{name}: {key}: the configuration has no such place")
+    table = data
+    for step in re.findall(r"\[\d+\]|[^.\[\]]+", owner):
+        try:
+            table = table[int(step[1:-1])] if step.startswith("[") else table.get(step)
+        except (LookupError, TypeError, AttributeError):
+            raise ConfigError(f"{name}: {key}: the configuration has no such place") from None
+        if table is None:
+            break
+    if value is None:
+        if table is not None:
+            table.pop(last, None)
+        return
+    if isinstance(table, dict) and isinstance(table.get(last), float) and type(value) is int:
+        value = float(value)
+    if not isinstance(table, Table) or last in table:
+        put(data, key, value, name)
+        return
+    tail = _cut_tail(table.value)
+    put(data, key, value, name)
+    for item in tail:
+        table.add(item)
+
+
+def _by_hand(name: str, what: str = "[controller]") -> ConfigError:
+    return ConfigError(f"{name}: {what} is written in a way that only a person can edit")
 
 
 def _edited(text: str, law: str, params: dict[str, Any], leaving: str) -> str:

@@ -1,0 +1,61 @@
+"""What a page may ask for: messages that it sends, checked before anything is done with them."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Literal
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from hapticd.settings import Table
+
+LARGEST_REQUEST = 16 * 1024
+"""Bytes; a page that sends more is disconnected."""
+
+
+class Hello(Table):
+    """The first message of every page: whether it may command."""
+
+    do: Literal["hello"]
+    token: str = Field("", max_length=100)
+
+
+class Command(Table):
+    """One of the buttons."""
+
+    do: Literal["arm", "disarm", "clear"]
+    id: int = 0
+
+
+class FormRequest(Table):
+    """The form as the file is now."""
+
+    do: Literal["form"]
+    id: int = 0
+
+
+class Edit(Table):
+    """The form, filled in: a law and the values that differ."""
+
+    do: Literal["edit"]
+    id: int = 0
+    hash: str = Field(max_length=100)
+    law: str = Field(min_length=1, max_length=200)
+    values: dict[str, bool | int | float | str | None] = Field(default_factory=dict, max_length=200)
+
+
+PageRequest = Hello | Command | FormRequest | Edit
+
+_ADAPTER: TypeAdapter[PageRequest] = TypeAdapter(PageRequest)
+
+
+def request(text: str | bytes) -> PageRequest | None:
+    """A page's message; None when it is not what a page of ours sends."""
+    try:
+        return _ADAPTER.validate_python(json.loads(text, parse_constant=_refuse))
+    except (ValidationError, ValueError, RecursionError):
+        return None
+
+
+def _refuse(constant: str) -> Any:
+    raise ValueError(f"{constant} is no JSON")
