@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.config.editing import with_law
+from hapticd.config.editing import with_edits, with_law
+from hapticd.config.loading import parse
 from hapticd.errors import ConfigError
 from hapticd.paths import directory
 from tests.examples import examples
@@ -147,3 +148,68 @@ def test_whatever_the_file_says_it_is_edited_rightly_or_refused(lines: list[str]
     assert {key: value for key, value in after.items() if key != "controller"} == {
         key: value for key, value in before.items() if key != "controller"
     }
+
+
+FULL = """\
+# the rig
+[safety]
+ramp_s = 0.1  # slow
+
+# what is touched
+[[scene.walls]]
+stiffness_n_per_m = 3000.0   # soft
+position_m = 0.01
+
+[[scene.walls]]
+stiffness_n_per_m = 1.0
+
+# the end
+"""
+
+
+def test_values_change_and_all_else_stays() -> None:
+    edited = with_edits(FULL, "lab.toml", {"scene.walls[0].stiffness_n_per_m": 2500, "safety.ramp_s": 0.2})
+    assert edited == FULL.replace("3000.0 ", "2500.0 ").replace("0.1  #", "0.2  #")
+
+
+def test_a_new_key_comes_behind_the_last_of_its_table() -> None:
+    edited = with_edits(FULL, "lab.toml", {"safety.max_force_n": 5, "scene.walls[1].damping_n_s_per_m": 1.5})
+    assert edited == FULL.replace("# slow\n", "# slow\nmax_force_n = 5\n").replace(
+        "= 1.0\n", "= 1.0\ndamping_n_s_per_m = 1.5\n"
+    )
+
+
+def test_none_takes_a_key_out_and_one_that_is_not_there_is_no_matter() -> None:
+    edited = with_edits(FULL, "lab.toml", {"scene.walls[0].position_m": None, "faults.keep": None})
+    assert edited == FULL.replace("position_m = 0.01\n", "")
+
+
+def test_a_table_that_is_not_there_is_made() -> None:
+    assert parse(with_edits(FULL, "lab.toml", {"faults.keep": 3}), "lab.toml").config.faults.keep == 3
+
+
+@pytest.mark.parametrize("key", ["scene.walls[2].axis", "scene.walls.axis", "scene.walls[0]", "safety[0]", "a b", ""])
+def test_a_key_without_a_place_is_refused(key: str) -> None:
+    with pytest.raises(ConfigError, match=r"lab\.toml: "):
+        with_edits(FULL, "lab.toml", {key: 1})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "safety = { ramp_s = 0.1 }\n",
+        "safety.ramp_s = 0.1\n[scene]\nwalls = [{ stiffness_n_per_m = 1.0 }]",
+        "\ufeff[safety]\r\nramp_s = 0.1\r\n",
+    ],
+)
+def test_however_it_is_written_the_values_are_in_it_afterwards(text: str) -> None:
+    edited = with_edits(text, "lab.toml", {"safety.max_force_n": 4.0, "safety.ramp_s": 0.3})
+    safety = parse(edited, "lab.toml").config.safety
+    assert (safety.max_force_n, safety.ramp_s) == (4.0, 0.3)
+    assert edited.startswith("\ufeff") == text.startswith("\ufeff")
+
+
+def test_a_text_that_is_no_toml_is_named() -> None:
+    with pytest.raises(ConfigError, match=r"lab\.toml: line 1"):
+        with_edits("[safety\n", "lab.toml", {"safety.ramp_s": 0.2})

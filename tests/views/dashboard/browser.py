@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import io
 import itertools
 import json
@@ -49,7 +50,10 @@ class Browser:
             assert self.process.poll() is None, "Chromium has ended"
             time.sleep(0.02)
         number, path = port.read_text().split("\n")[:2]
-        self.socket = connect(f"ws://127.0.0.1:{number}{path}", max_size=None, compression=None)
+        self._open = contextlib.ExitStack()
+        self.socket = self._open.enter_context(
+            connect(f"ws://127.0.0.1:{number}{path}", max_size=None, compression=None)
+        )
         self.heard: list[dict[str, Any]] = []
         self._ids = itertools.count(1)
 
@@ -57,7 +61,7 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.socket.close()
+        self._open.close()
         self.process.terminate()
         self.process.wait(PATIENCE_S)
         shutil.rmtree(self.directory, ignore_errors=True)
@@ -147,9 +151,7 @@ class Page:
             self.call("Input.dispatchKeyEvent", type=kind, key=key)
 
     def resize(self, width: int, height: int) -> None:
-        self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
-        )
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def text(self) -> str:
         return str(self.evaluate("document.body.innerText"))

@@ -52,5 +52,3 @@ class Served:
         """Memory that it has resident."""
         status = Path(f"/proc/{self.process.pid}/status").read_text()
         return int(re.findall(r"VmRSS:\s+(\d+)", status)[0])
-
-

@@ -32,7 +32,7 @@ def form(loaded: LoadedConfig) -> dict[str, Any]:
         loaded: it.
 
     Returns:
-        `law`, its name; `laws`, each with `name`, `summary` and `fields`; `walls`, the fields of each; `limits`, fields.
+        `law`, its name; `laws`, each with `name`, `summary` and `fields`; `walls`, the fields of each; `limits`, too.
         A field has `key`, `name`, `unit`, `meaning`, `allowed`, `kind` (number, whole, flag, choice or text),
         `choices`, `optional` and `value`, which is None when it is not set.
     """

@@ -68,26 +68,26 @@ class Dashboard:
         Raises:
             ClientError: the port cannot be had.
         """
+        serving = serve(
+            self._look,
+            self._address.host,
+            self._address.port,
+            process_request=self._admit,
+            compression=None,
+            max_size=LARGEST_REQUEST,
+            max_queue=4,
+            close_timeout=1.0,
+            server_header=None,
+            logger=_silent(),
+        )
         try:
-            server = await serve(
-                self._look,
-                self._address.host,
-                self._address.port,
-                process_request=self._admit,
-                compression=None,
-                max_size=LARGEST_REQUEST,
-                max_queue=4,
-                server_header=None,
-                logger=_silent(),
-            )
+            async with serving:
+                ready()
+                await self._feed.run()
         except OSError as error:
             advice = "; name another --port" if error.errno in (errno.EADDRINUSE, errno.EACCES) else ""
             raise ClientError(f"{self._address.url}: {error.strerror}{advice}") from None
-        try:
-            ready()
-            await self._feed.run()
         finally:
-            server.close()
             for threads in self._threads.values():
                 threads.shutdown(wait=False, cancel_futures=True)
 

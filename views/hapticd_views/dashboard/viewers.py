@@ -1,9 +1,12 @@
-"""The pages that look: each has a queue of its own, and one that does not read loses its connection and nothing else."""
+"""The pages that look: each has a queue of its own, and one that does not read loses its connection, no other does."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import socket
+import struct
 from typing import Any
 
 from websockets.asyncio.server import ServerConnection
@@ -14,6 +17,11 @@ MOST_VIEWERS = 32
 
 MOST_UNSENT = 300
 """Messages that wait for one viewer, ten seconds of them; at one more it is disconnected and may come again."""
+
+KERNEL_BYTES = 128 * 1024
+"""What the kernel may keep for one viewer, beside that."""
+
+_NO_FAREWELL = struct.pack("ii", 1, 0)  # SO_LINGER: a connection that is given up frees what the kernel keeps for it
 
 Message = dict[str, Any] | bytes
 
@@ -32,10 +40,13 @@ class Viewer:
         self.may_command = False
         self._connection = connection
         self._queue: asyncio.Queue[str | bytes] = asyncio.Queue()
+        self._socket().setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KERNEL_BYTES)
 
     def send(self, message: str | bytes) -> None:
         """Have a message sent; returns at once."""
         if self._queue.qsize() >= MOST_UNSENT:
+            with contextlib.suppress(OSError):  # it has gone by itself
+                self._socket().setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_FAREWELL)
             self._connection.transport.abort()
         else:
             self._queue.put_nowait(message)
@@ -51,6 +62,9 @@ class Viewer:
                 await self._connection.send(await self._queue.get())
         except ConnectionClosed:
             pass
+
+    def _socket(self) -> Any:
+        return self._connection.transport.get_extra_info("socket")
 
 
 class Audience:
