@@ -88,7 +88,8 @@ def test_a_topic_that_never_comes_does_not_pile_up() -> None:
     joiner, taken = TickJoiner(), 0
     for seq in range(3 * MOST_WAITING):
         joiner.add(parts(seq)[0])
-        taken += len(joiner.take())
+        if seq % 200 == 0:
+            taken += len(joiner.take())
     assert taken >= 2 * MOST_WAITING
 
 
