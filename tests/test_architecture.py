@@ -95,7 +95,7 @@ def test_the_wheel_holds_six_packages_and_nothing_called_drivers(installed: Path
 
 def test_the_wheel_holds_every_shipped_configuration(installed: Path) -> None:
     shipped = {path.name: path.read_bytes() for path in (ROOT / "config").glob("*.toml")}
-    assert {path.name: path.read_bytes() for path in (installed / "hapticd/share/config").iterdir()} == shipped
+    assert {path.name: path.read_bytes() for path in (installed / "hapticd/share/config").glob("*.toml")} == shipped
 
 
 def test_an_installed_hapticd_finds_its_own_configuration_and_plugins(installed: Path, tmp_path: Path) -> None:

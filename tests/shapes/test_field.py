@@ -130,7 +130,7 @@ def test_a_file_of_another_kind_says_how_one_is_made() -> None:
 )
 def test_a_field_that_cannot_be_is_refused(changed: dict[str, object]) -> None:
     with pytest.raises(ConfigError, match="is no possible distance field"):
-        Field.unpack(replace(CUBE, **changed).pack())  # type: ignore[arg-type]
+        Field.unpack(replace(CUBE, **changed).pack())  # type: ignore[arg-type]  # as a field of any kind
 
 
 @pytest.mark.parametrize(("shape", "field"), [("mesh", None), ("sphere", TORUS)])

@@ -130,7 +130,7 @@ def test_a_press_into_a_ball_is_the_analytic_one(direction: Point, depth_m: floa
     u = (direction[0] / size, direction[1] / size, direction[2] / size)
     centre = (0.01, -0.02, 0.015)
     proxy = Proxy([Placed("sphere", ASKEW, radius_m=0.012)])
-    stand(proxy, tuple(c + 0.013 * e for c, e in zip(centre, u, strict=True)))  # type: ignore[arg-type]
+    stand(proxy, tuple(c + 0.013 * e for c, e in zip(centre, u, strict=True)))  # type: ignore[arg-type]  # three numbers
     for share in (0.25, 0.5, 0.75, 1.0):
         r = 0.012 - share * depth_m
         go(proxy, (centre[0] + r * u[0], centre[1] + r * u[1], centre[2] + r * u[2]))

@@ -135,7 +135,7 @@ def walk(
     """
     rng = random.Random(seed)
     middle = proxy.shapes[0].pose.position_m
-    p: Point = tuple(at + rng.gauss(0.0, reach_m) for at in middle)  # type: ignore[assignment]
+    p: Point = tuple(at + rng.gauss(0.0, reach_m) for at in middle)  # type: ignore[assignment]  # three of them
     v = [0.0, 0.0, 0.0]
     target = list(p)
     stand(proxy, p)
