@@ -29,9 +29,12 @@ def _run(arguments: list[str]) -> int:
         # These imports take long enough for an interrupt to come.
         import typer
 
+        from hapticd.cli import completion
         from hapticd.cli.app import application
 
-        wanted = next((argument for argument in arguments if not argument.startswith("-")), None)
+        if completion.VARIABLE in os.environ:
+            completion.ready()
+        wanted = next((word for word in completion.words(arguments) if not word.startswith("-")), None)
         command = typer.main.get_command(application(wanted))
         status = command.main(arguments, prog_name="hapticd", standalone_mode=False)
         sys.stdout.flush()

@@ -35,6 +35,7 @@ COMMANDS: Final = {
     "fault": ("fault", "List, show or export the records of faults."),
     "keys": ("keys", "Say who may reach this computer's daemons from another one."),
     "service": ("service", "Install, show or remove the system service."),
+    "completion": ("completion", "Print what a shell needs to complete command lines."),
     "simulate": ("simulate", "Run a configuration offline on the simulated device."),
 }
 """Every command with its module below `hapticd.cli` and its line in the overview.

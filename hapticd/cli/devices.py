@@ -34,7 +34,7 @@ Details = tuple[str, Sequence[str]]
 
 def devices(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="Only this driver, also `package.module`, with its options.")
+        str | None, typer.Argument(metavar="NAME", help="Only this driver, also `package.module`, with its options.")
     ] = None,
     config: Annotated[
         Path | None,

@@ -31,7 +31,7 @@ Directory = Annotated[
     Path | None, typer.Option("--directory", help="Where the records lie; the daemon's own place when not given.")
 ]
 Name = Annotated[
-    str | None, typer.Argument(metavar="[NAME]", help="Which record, or a part of its name; the newest when not given.")
+    str | None, typer.Argument(metavar="NAME", help="Which record, or a part of its name; the newest when not given.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 

@@ -57,7 +57,7 @@ def keys(
 @app.command()
 def make(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="Of a client; the daemons' own pair when not given.")
+        str | None, typer.Argument(metavar="NAME", help="Of a client; the daemons' own pair when not given.")
     ] = None,
     server_key: Annotated[
         str | None,

@@ -174,7 +174,7 @@ def _shown_default(default: object) -> str:
 
 
 def controllers(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Only this law, also `package.module`.")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="Only this law, also `package.module`.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array, an object a law.")] = False,
 ) -> None:
     """List the installed laws and their parameters.

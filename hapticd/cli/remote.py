@@ -11,11 +11,12 @@ from typing import Annotated
 
 import typer
 
+from hapticd.cli.completion import instances
 from hapticd.client import commands
 from hapticd.client.commands import command
 from hapticd.paths import DEFAULT_INSTANCE
 
-Instance = Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.")]
+Instance = Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.", autocompletion=instances)]
 Connect = Annotated[
     str | None,
     typer.Option("--connect", metavar="ENDPOINT", help="The daemon's control.tcp, tcp://HOST:PORT, instead of a name."),

@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from hapticd.service.install import METRICS_UNIT, Installation, systemd_runs, unit_states
+from hapticd.cli.manual import shared_files
+from hapticd.service.install import METRICS_UNIT, PACKAGE, Installation, systemd_runs, unit_states
 
 app = typer.Typer(
     help="Install the daemon as a service, look at it, remove it.",
@@ -38,7 +39,7 @@ def install(
 
     Example: hapticd service install
     """
-    Installation(root, executable, prefix).install(typer.echo)
+    _installation(root, executable, prefix).install(typer.echo)
 
 
 @app.command()
@@ -47,7 +48,7 @@ def uninstall(root: Root = Path("/"), prefix: Prefix = None) -> None:
 
     Example: hapticd service uninstall
     """
-    Installation(root, prefix=prefix).uninstall(typer.echo)
+    _installation(root, prefix=prefix).uninstall(typer.echo)
 
 
 @app.command()
@@ -58,7 +59,7 @@ def status(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
 
     Example: hapticd service status
     """
-    files = Installation().files()
+    files = _installation().files()
     units = unit_states()
     if as_json:
         shown = {
@@ -85,3 +86,9 @@ def status(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
         unit.active == "active" for unit in units if unit.name != METRICS_UNIT
     )
     raise typer.Exit(0 if well else 1)
+
+
+def _installation(root: Path = Path("/"), executable: Path | None = None, prefix: Path | None = None) -> Installation:
+    packaged = Installation(root, executable, prefix).prefix == PACKAGE
+    zsh = "vendor-completions" if packaged else "site-functions"
+    return Installation(root, executable, prefix, shared_files(zsh))

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from hapticd.cli.completion import instances
 from hapticd.client.commands import command
 from hapticd.errors import InstanceError
 from hapticd.paths import living_instances
@@ -19,7 +20,9 @@ SCHEMA = 1
 
 
 def status(
-    instance: Annotated[str | None, typer.Option("--instance", "-i", help="Only this daemon.")] = None,
+    instance: Annotated[
+        str | None, typer.Option("--instance", "-i", help="Only this daemon.", autocompletion=instances)
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Say how every daemon of this computer is.

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from hapticd.cli.completion import laws
 from hapticd.cli.remote import Instance
 from hapticd.client.commands import RefusedConfigError, command
 from hapticd.client.edited import put_into_force
@@ -22,7 +23,7 @@ from hapticd.paths import CONTROL, DEFAULT_INSTANCE, SYSTEM_CONFIG, locate
 
 
 def switch(
-    law: Annotated[str, typer.Argument(metavar="LAW", help="Installed law, or package.module.")],
+    law: Annotated[str, typer.Argument(metavar="LAW", help="Installed law, or package.module.", autocompletion=laws)],
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", "-s", metavar="KEY=VALUE", help="Parameter of the law; may be given several times."),

@@ -253,7 +253,9 @@ class Installation:
             raise _denied(target, error) from error
         common = {self._at(self.prefix / name) for name in ("lib", "bin", "share")}
         for above in target.parents:
-            if above in common or any(above.iterdir()):
+            # Below share the directories are those of shells and man, but for one.
+            foreign = above.is_relative_to(self._at(self.prefix / "share")) and above.name != "hapticd"
+            if above in common or foreign or any(above.iterdir()):
                 break
             above.rmdir()
         return True

@@ -32,7 +32,7 @@ def metrics(
         typer.Option("--listen", metavar="HOST:PORT", help="Serve them there until interrupted, by HTTP."),
     ] = None,
 ) -> None:
-    """Print what every daemon of this computer says of itself, as Prometheus reads it.
+    """Print what every daemon says of itself, for Prometheus.
 
     Rate, lateness, armed or not, faults and more; docs/metrics.md has all of it, and a dashboard for Grafana. With
     --listen they are served at http://HOST:PORT/metrics, by this process and not by a daemon; who may connect there can
