@@ -73,6 +73,7 @@ class Batch:
         duration_s: simulated time [s].
         window_s: how much of the end is reported on [s].
         trace_every: keep one tick in this many; 0: none.
+        trace_last_s: only those of this much of the end [s].
         ledger: keep the energy books; without them cycles and energies stay 0.
 
     Raises:
@@ -91,6 +92,7 @@ class Batch:
         window_s: float = 0.5,
         trace_every: int = 0,
         ledger: bool = True,
+        trace_last_s: float = math.inf,
     ) -> None:
         if not points:
             raise ConfigError("a batch needs at least one point")
@@ -99,7 +101,7 @@ class Batch:
         self.prepared = []
         for at, point in enumerate(points):
             try:
-                self.prepared.append(Prepared(law, point, duration_s, window_s, trace_every))
+                self.prepared.append(Prepared(law, point, duration_s, window_s, trace_every, trace_last_s))
             except ValueError as error:
                 raise ConfigError(f"points[{at}]: {error}") from error
         state_names = state_fields(law)
@@ -115,7 +117,8 @@ class Batch:
         for point in points:
             for name, on in terms(point.device).items():
                 self.switches[name] = self.switches.get(name, False) or on
-        self._rows = max(one.ticks for one in self.prepared) // trace_every if trace_every else 0
+        longest = max(one.ticks - one.params["trace_from"] for one in self.prepared)
+        self._rows = longest // trace_every if trace_every else 0
 
     def run(self, workers: int | None = None, progress: Callable[[int], None] | None = None) -> BatchResult:
         """Run every point as machine code.

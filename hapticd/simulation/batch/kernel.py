@@ -153,8 +153,10 @@ def run(
                     loop.outside_tick = count
             if last_window:
                 report(plant, loop)
-            if TRACE and (count + 1) % params.trace_every == 0:
-                record(plant, loop, ledger, trace, count // params.trace_every)
+            if TRACE:
+                traced = count - params.trace_from
+                if traced >= 0 and (traced + 1) % params.trace_every == 0:
+                    record(plant, loop, ledger, trace, traced // params.trace_every)
         loop.ticks = segment.stop
 
 

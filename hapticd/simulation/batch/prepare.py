@@ -19,7 +19,15 @@ from hapticd.simulation.plant import delay_line, epochs, recorded_points, sense,
 class Prepared:
     """One point as scalar fields, its first sample taken and its law started."""
 
-    def __init__(self, law: ModuleType, point: Point, duration_s: float, window_s: float, trace_every: int) -> None:
+    def __init__(
+        self,
+        law: ModuleType,
+        point: Point,
+        duration_s: float,
+        window_s: float,
+        trace_every: int,
+        trace_last_s: float,
+    ) -> None:
         device, period_s = point.device, point.period_s
         changes = epochs(device, period_s)
         self.ticks = max(1, round(duration_s / period_s))
@@ -56,6 +64,7 @@ class Prepared:
             "band_m": point.band_m,
             "first_segment": 0,
             "end_segment": 0,
+            "trace_from": self.ticks - round(min(duration_s, trace_last_s) / period_s),
             "trace_every": max(1, trace_every),
         }
         self.loop: dict[str, Any] = {name: kind(0) for name, kind in hints(LoopState).items()} | {

@@ -56,6 +56,7 @@ class LoopParams:
     band_m: float
     first_segment: int
     end_segment: int
+    trace_from: int
     trace_every: int
 
 

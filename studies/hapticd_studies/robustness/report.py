@@ -12,6 +12,7 @@ from rich.table import Table
 
 from hapticd.offline.outcome import Outcome
 from hapticd.version import __version__
+from hapticd_studies.felt import JUST_FELT
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.robustness.devices import DRAWN, DURATION_S, WITHIN_REACH, Device
 from hapticd_studies.robustness.readings import PAPER, short
@@ -42,6 +43,9 @@ class RobustnessSummary:
         reading: its label.
         prompt, late: devices within reach without and with one sample of delay.
         beyond: devices beyond the reach of damping.
+        not_felt: of those that settled, the ones whose rest is below the threshold of touch.
+        median_felt: median felt index of those that settled; None when none did.
+        median_chatter_n: median span of their force over the last second [N].
         median_settled_s: median settling time of those that settled; None when none did [s].
         median_damping_n_s_per_m: median damping at the end.
     """
@@ -50,6 +54,9 @@ class RobustnessSummary:
     prompt: Share
     late: Share
     beyond: Share
+    not_felt: Share
+    median_felt: float | None
+    median_chatter_n: float | None
     median_settled_s: float | None
     median_damping_n_s_per_m: float
 
@@ -114,14 +121,16 @@ class RobustnessReport:
         """For the terminal: a line a reading."""
         shown = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         shown.add_column("law, reading", overflow="fold")
-        for head in ("no delay", "1 sample late", "beyond reach", "settled in"):
+        for head in ("no delay", "1 sample late", "beyond", "in", "not felt", "chatter"):
             shown.add_column(head, justify="right", no_wrap=True)
         for one in self.summaries:
             name, values = short(one.reading)
             label = f"  {escape(values)}" if values else f"[bold]{escape(name)}[/]"
             settled = "" if one.median_settled_s is None else f"{one.median_settled_s:.2f} s"
+            chatter = "" if one.median_chatter_n is None else f"{one.median_chatter_n:.2g} N"
             beyond = f"{one.beyond.settled}/{one.beyond.devices}"
-            shown.add_row(label, _percent(one.prompt), _percent(one.late), beyond, settled)
+            shares = [_percent(one.prompt), _percent(one.late), beyond, settled, _percent(one.not_felt), chatter]
+            shown.add_row(label, *shares)
         return shown
 
     def json(self) -> bytes:
@@ -215,11 +224,15 @@ def _summary(label: str, devices: Sequence[Device], table: np.ndarray[Any, Any])
     prompt, delayed, beyond = (
         Share(int(settled[group].sum()), int(group.sum())) for group in (reach & ~late, reach & late, ~reach)
     )
+    felt, chatter_n = (table[settled, COLUMNS.index(name)] for name in ("felt_index", "force_chatter_n"))
     return RobustnessSummary(
         label,
         prompt,
         delayed,
         beyond,
+        not_felt=Share(int((felt <= JUST_FELT).sum()), len(felt)),
+        median_felt=float(np.median(felt)) if len(felt) else None,
+        median_chatter_n=float(np.median(chatter_n)) if len(felt) else None,
         median_settled_s=float(np.median(times)) if len(times) else None,
         median_damping_n_s_per_m=float(np.median(table[:, COLUMNS.index("damping_n_s_per_m")])),
     )

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from hapticd.offline.outcome import Criterion
-from hapticd.offline.presses import judge, misplaced_m
+from hapticd.offline.presses import balance_m, judge, misplaced_m
 from hapticd.simulation.batch import Batch
+from hapticd_studies.felt import WINDOW_S, felt_ends
 from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
 from hapticd_studies.law_spec import LawSpec
@@ -25,8 +26,12 @@ COLUMNS = (
     "damping_n_s_per_m",
     "felt_mass_kg",
     "peak_force_n",
+    "felt_index",
+    "force_chatter_n",
+    "misplaced_share",
 )
-"""Of each device: positive `misplaced_m` is too deep, and `settled_s` counts from the last change of the wall."""
+"""Of each device: positive `misplaced_m` is too deep, `misplaced_share` the same of the depth where it should rest,
+`settled_s` counts from the last change of the wall, `felt_index` and `force_chatter_n` are of the last second."""
 
 _MOST_DEVICES = 250
 
@@ -73,16 +78,23 @@ class RobustnessPlan:
 def pressed(devices: Sequence[Device], reading: LawSpec, criterion: Criterion, threads: int | None = None) -> list[Row]:
     """The row of each device under a reading."""
     points = [device.point(params_on(reading, device), criterion) for device in devices]
-    result = Batch(reading.law, points, DURATION_S, criterion.window_s, ledger=False).run(threads)
+    result = Batch(
+        reading.law, points, DURATION_S, criterion.window_s, trace_every=1, ledger=False, trace_last_s=WINDOW_S
+    ).run(threads)
+    felt, chatter_n = felt_ends(points, result)
+    misplaced = misplaced_m(points, result)
     rows: list[Row] = np.array(
         [
             judge(criterion, points, result),
             result.peak_to_peak_m,
-            misplaced_m(points, result),
+            misplaced,
             result.settled_s - [device.last_change_s for device in devices],
             result.damping_n_s_per_m,
             result.felt_mass_kg,
             result.peak_force_n,
+            felt,
+            chatter_n,
+            misplaced / np.abs([balance_m(point) for point in points]),
         ]
     ).T.tolist()
     return rows

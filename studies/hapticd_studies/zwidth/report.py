@@ -14,6 +14,7 @@ from hapticd.config.loading import parse
 from hapticd.offline.outcome import PRESSED, Outcome
 from hapticd.version import __version__
 from hapticd_studies.boundaries import BOUNDARIES
+from hapticd_studies.felt import JUST_FELT
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.zwidth.curves import Curve, curves, limits
 from hapticd_studies.zwidth.scenario import scenario_of
@@ -31,6 +32,7 @@ class ZwidthSummary:
         settled_share: their share.
         lowest_edge, median_edge: where lines change; None without any edge.
         as_linear: share of cells whose verdict is the one of the exact linear limit; None where that says nothing.
+        not_felt: of the cells that settled, the share whose rest is below the threshold of touch; None without any.
         without_edge: how many lines have no edge because all or none of them settles.
     """
 
@@ -41,6 +43,7 @@ class ZwidthSummary:
     lowest_edge: float | None
     median_edge: float | None
     as_linear: float | None
+    not_felt: float | None = None
     without_edge: tuple[tuple[int, str], ...] = ()
 
 
@@ -67,7 +70,7 @@ class ZwidthReport:
         shown = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         shown.add_column("law", overflow="fold")
         heads = (
-            ["settled cells", "share", "as the linear limit"]
+            ["settled cells", "share", "not felt", "as the linear limit"]
             if cells
             else ["lines", "lowest edge", "median edge", "without an edge"]
         )
@@ -77,7 +80,8 @@ class ZwidthReport:
         for one in self.summaries:
             if cells:
                 linear = "" if one.as_linear is None else f"{100.0 * one.as_linear:.1f} %"
-                row = [f"{one.settled} / {one.cells}", f"{100.0 * one.settled_share:.1f} %", linear]
+                not_felt = "" if one.not_felt is None else f"{100.0 * one.not_felt:.1f} %"
+                row = [f"{one.settled} / {one.cells}", f"{100.0 * one.settled_share:.1f} %", not_felt, linear]
             else:
                 edges = (one.lowest_edge, one.median_edge)
                 row = [str(one.cells), *("" if edge is None else f"{edge:.5g}{unit}" for edge in edges)]
@@ -106,6 +110,7 @@ class ZwidthReport:
                         "settled": one.settled,
                         "cells": one.cells,
                         "settled_share": one.settled_share,
+                        "not_felt_share_of_settled": one.not_felt,
                         "lowest_edge": one.lowest_edge,
                         "median_edge": one.median_edge,
                         "same_verdict_as_linear_limit": one.as_linear,
@@ -165,7 +170,9 @@ def _cells_summary(law: str, table: np.ndarray[Any, Any], stable: np.ndarray[Any
     known = ~np.isnan(stable).ravel()
     same = settled[known] == (stable.ravel()[known] > 1.0)
     linear = float(same.mean()) if law == "none" and known.any() else None
-    return ZwidthSummary(law, int(settled.sum()), len(table), float(settled.mean()), None, None, linear)
+    felt = table[settled, GRID_COLUMNS.index("felt_index")]
+    not_felt = float((felt <= JUST_FELT).mean()) if len(felt) else None
+    return ZwidthSummary(law, int(settled.sum()), len(table), float(settled.mean()), None, None, linear, not_felt)
 
 
 def _edge_summary(law: str, table: np.ndarray[Any, Any]) -> ZwidthSummary:
@@ -179,5 +186,7 @@ def _edge_summary(law: str, table: np.ndarray[Any, Any]) -> ZwidthSummary:
         float(edges.min()) if some else None,
         float(np.median(edges)) if some else None,
         None,
-        tuple((int(np.sum((table[:, 0] == at) & (table[:, 1] == at))), word) for at, word in ((1, "all"), (0, "none"))),
+        without_edge=tuple(
+            (int(np.sum((table[:, 0] == at) & (table[:, 1] == at))), word) for at, word in ((1, "all"), (0, "none"))
+        ),
     )

@@ -12,8 +12,9 @@ import numpy as np
 
 from hapticd.config.loading import parse
 from hapticd.offline.outcome import Criterion, Outcome
-from hapticd.offline.presses import judge, misplaced_m
+from hapticd.offline.presses import balance_m, judge, misplaced_m
 from hapticd.simulation.batch import Batch, Point
+from hapticd_studies.felt import WINDOW_S, felt_ends
 from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
 from hapticd_studies.law_spec import LawSpec
@@ -28,6 +29,9 @@ GRID_COLUMNS = (
     "settled_s",
     "damping_n_s_per_m",
     "felt_mass_kg",
+    "misplaced_share",
+    "felt_index",
+    "force_chatter_n",
 )
 """Of each cell: the worst outcome of its starts, how many settled, and the largest of each figure among them."""
 
@@ -128,7 +132,36 @@ class _Press:
         """The rows of cells."""
         columns = len(self._x.values)
         places = [(self._x.values[cell % columns], self._y.values[cell // columns]) for cell in cells]
-        return self._pressed(places)
+        points = self._points_of(places)
+        batch = Batch(
+            self._law,
+            points,
+            self._duration_s,
+            self._criterion.window_s,
+            trace_every=1,
+            ledger=False,
+            trace_last_s=WINDOW_S,
+        )
+        result = batch.run(self._threads)
+        outcomes = judge(self._criterion, points, result)
+        misplaced = np.abs(misplaced_m(points, result))
+        table = np.array(
+            [
+                outcomes,
+                outcomes == Outcome.SETTLED,
+                result.peak_to_peak_m,
+                misplaced,
+                result.settled_s,
+                result.damping_n_s_per_m,
+                result.felt_mass_kg,
+                misplaced / np.abs([balance_m(point) for point in points]),
+                *felt_ends(points, result),
+            ]
+        ).reshape(len(GRID_COLUMNS), len(places), self._starts)
+        rows = table.max(axis=2)
+        rows[1] = table[1].sum(axis=1)
+        found: list[Row] = rows.T.tolist()
+        return found
 
     def edges(self, lines: Sequence[int]) -> list[Row]:
         """The rows of lines, all halved in step."""
@@ -148,28 +181,15 @@ class _Press:
         return rows
 
     def _settles(self, places: Sequence[tuple[float, float]]) -> list[bool]:
-        return [row[0] == Outcome.SETTLED for row in self._pressed(places)]
-
-    def _pressed(self, places: Sequence[tuple[float, float]]) -> list[Row]:
-        points = [point for x, y in places for point in self._points(x, y)]
+        """Whether all starts of each place settle."""
+        points = self._points_of(places)
         result = Batch(self._law, points, self._duration_s, self._criterion.window_s, ledger=False).run(self._threads)
-        outcomes = judge(self._criterion, points, result)
-        misplaced = misplaced_m(points, result)
-        table = np.array(
-            [
-                outcomes,
-                outcomes == Outcome.SETTLED,
-                result.peak_to_peak_m,
-                np.abs(misplaced),
-                result.settled_s,
-                result.damping_n_s_per_m,
-                result.felt_mass_kg,
-            ]
-        ).reshape(len(GRID_COLUMNS), len(places), self._starts)
-        rows = table.max(axis=2)
-        rows[1] = table[1].sum(axis=1)
-        found: list[Row] = rows.T.tolist()
+        settled = judge(self._criterion, points, result) == Outcome.SETTLED
+        found: list[bool] = settled.reshape(len(places), self._starts).all(axis=1).tolist()
         return found
+
+    def _points_of(self, places: Sequence[tuple[float, float]]) -> list[Point]:
+        return [point for x, y in places for point in self._points(x, y)]
 
     def _points(self, x: float, y: float) -> list[Point]:
         scenario = self._x.quantity.put(self._y.quantity.put(self._scenario, y), x)
