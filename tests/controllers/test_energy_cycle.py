@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import random
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from hapticd.law import LawSnapshot
+from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
 from hapticd_controllers import energy_cycle
 from hapticd_controllers.energy_cycle import Params
 
@@ -294,3 +296,50 @@ def test_what_a_new_touch_forgets(forgets: str, kept: bool) -> None:
     while not rig.tick.in_contact:
         rig.run(1e-3)
     assert (rig.state.damping_n_s_per_m >= reached) == kept
+
+
+PAIRED = {"exact": 3.0 * 0.5, "held-power": 3.0 * 4.0 * 2e-3, "new-force": 7.0 * 0.5, "power": 7.0 * 4.0 * 2e-3}
+
+
+@pytest.mark.parametrize("pairing", PAIRED)
+@pytest.mark.parametrize("work", ["spring", "total"])
+def test_each_pairing_counts_the_work_of_its_force_along_its_move(pairing: str, work: str) -> None:
+    """One tick: 3 N held by the wall and 2 N by the damper, 7 N new, 10 N s/m of damping, 0.5 m at 4 m/s and 2 ms."""
+    read = Params.model_validate({"pairing": pairing, "work": work, "force_delay": "none"})
+    params = plain_object("Params", scalar_params(read))
+    state = fresh_state(energy_cycle)
+    energy_cycle.start(state, params, LawSnapshot(x_m=-1.0))
+    state.damping_n_s_per_m = 10.0
+    tick = LawTick(x_m=-1.0, moved_m=0.5, velocity_m_per_s=4.0, dt_s=2e-3, in_contact=True, contact_n=7.0, spring_n=7.0)
+    tick.applied_contact_n, tick.applied_n = 3.0, 5.0
+    energy_cycle._count_energy(state, params, tick)
+    expected_j = PAIRED[pairing]
+    if work == "total":
+        per_newton = expected_j / (3.0 if pairing in ("exact", "held-power") else 7.0)
+        extra_n = 2.0 if pairing in ("exact", "held-power") else -10.0 * 4.0
+        expected_j += per_newton * extra_n
+    assert state.energy_j == pytest.approx(-expected_j)
+
+
+def test_the_travel_of_a_cycle_is_from_its_deepest_to_its_highest_point_inside() -> None:
+    params = plain_object("Params", scalar_params(Params()))
+    state = fresh_state(energy_cycle)
+    energy_cycle.start(state, params, LawSnapshot(x_m=-2e-3))
+    for x_m in (-3e-3, -5e-3, -1e-3, -2e-3):
+        tick = LawTick(x_m=x_m, in_contact=True, contact_n=1.0, spring_n=1.0)
+        energy_cycle._count_energy(state, params, tick)
+    energy_cycle._count_energy(state, params, LawTick(x_m=4e-3))
+    assert (state.lowest_m, state.highest_m) == (-5e-3, -1e-3)
+
+
+def test_the_caps_are_what_the_page_says() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "controllers.md").read_text()
+    rows = re.findall(r"^\| (`[a-z_]+`(?:, `[a-z_]+`)*) \| ([^|]+) \|", page, re.MULTILINE)
+    told: dict[str, str] = {}
+    for names, values in rows:
+        for name, value in zip(names.replace("`", "").split(", "), values.split(", "), strict=False):
+            told.setdefault(name, value.strip())
+    defaults = Params().model_dump()
+    for name in ("cap_share", "late_cap_share", "cap_damping_n_s_per_m", "mass_kg", "felt_mass_memory", "small_leaks"):
+        assert float(told[name]) == defaults[name], name
+    assert (defaults["cap"], told["cap"]) == ("felt-mass", "felt-mass")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from hapticd.errors import DeviceNotFoundError
 from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED
 from hapticd.loop.resume import ResumeState
 from hapticd.simulation.options import SimulationOptions
@@ -77,3 +79,66 @@ def test_clearing_again_and_again_keeps_no_device_away(looking: tuple[Recovery, 
         try_now(made)
     assert len(tries) == 2
     assert not tries[1].ended
+
+
+class Lost:
+    """A device that stays away, and a clock of the test's."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 1000.0
+        self.plugged_in = False
+        monkeypatch.setattr(recovery, "time", SimpleNamespace(monotonic=lambda: self.now_s))
+        monkeypatch.setattr(recovery, "HotplugWatch", lambda: SimpleNamespace(news=self._news))
+        monkeypatch.setattr(recovery, "LoopStart", self._refuse)
+        self.made = Recovery()
+        self.tries_s: list[float] = []
+
+    def _news(self) -> bool:
+        news, self.plugged_in = self.plugged_in, False
+        return news
+
+    def _refuse(self, *_arguments: Any) -> UnderWay:
+        self.tries_s.append(self.now_s)
+        raise DeviceNotFoundError("not there")
+
+    def waits_s(self, tries: int) -> list[float]:
+        """How long it was from one try to the next, a turn every 10 ms."""
+        self.tries_s = [self.now_s]
+        while len(self.tries_s) <= tries:
+            self.now_s = round(self.now_s + 0.01, 2)
+            self.made.turn(LOST, NO_CONFIG)
+        return [later - earlier for earlier, later in itertools.pairwise(self.tries_s)]
+
+
+@pytest.fixture
+def lost(monkeypatch: pytest.MonkeyPatch) -> Lost:
+    away = Lost(monkeypatch)
+    away.made.begin(LOST, "unplugged")
+    return away
+
+
+def test_the_waits_double_from_one_second_to_thirty(lost: Lost) -> None:
+    assert lost.waits_s(8) == pytest.approx([1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0, 30.0], abs=0.02)
+
+
+def test_what_is_plugged_in_is_tried_a_second_later_and_the_waits_begin_anew(lost: Lost) -> None:
+    lost.waits_s(6)
+    lost.plugged_in = True
+    assert lost.waits_s(4) == pytest.approx([1.0, 1.0, 2.0, 4.0], abs=0.02)
+
+
+@pytest.mark.parametrize(("steady_s", "waits_s"), [(59.9, [8.0, 16.0]), (60.2, [1.0, 2.0])])
+def test_a_device_that_stayed_for_a_minute_is_looked_for_as_if_for_the_first_time(
+    monkeypatch: pytest.MonkeyPatch, lost: Lost, steady_s: float, waits_s: list[float]
+) -> None:
+    lost.waits_s(2)  # the next one that fails is followed by 8 s
+    found = SimpleNamespace(poll=lambda: LOST, end=lambda: None)
+    refuse = lost._refuse
+    monkeypatch.setattr(recovery, "LoopStart", lambda *_arguments: found)
+    while lost.made.lost:
+        lost.now_s += 0.01
+        lost.made.turn(LOST, NO_CONFIG)
+    monkeypatch.setattr(recovery, "LoopStart", refuse)
+    lost.now_s += steady_s
+    lost.made.begin(LOST, "unplugged again")
+    assert lost.waits_s(2) == pytest.approx(waits_s, abs=0.02)

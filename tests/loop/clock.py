@@ -13,17 +13,25 @@ class Clock:
 
     Args:
         monkeypatch: puts it in the loop's place until the test has ended.
+
+    Attributes:
+        now_ns: what it shows [ns].
+        computed_ns: what the thread has computed [ns]; None: what it really has.
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_ns = 1_000_000_000
-        clocks = SimpleNamespace(monotonic_ns=lambda: self.now_ns, thread_time_ns=time.thread_time_ns)
+        self.computed_ns: int | None = None
+        clocks = SimpleNamespace(monotonic_ns=lambda: self.now_ns, thread_time_ns=self._thread_time_ns)
         monkeypatch.setattr("hapticd.loop.loop.time", clocks)
 
     @property
     def now_s(self) -> float:
         """The same in seconds."""
         return self.now_ns * 1e-9
+
+    def _thread_time_ns(self) -> int:
+        return time.thread_time_ns() if self.computed_ns is None else self.computed_ns
 
     def pass_s(self, duration_s: float) -> None:
         """Let time pass."""

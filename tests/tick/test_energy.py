@@ -294,3 +294,23 @@ def test_a_day_of_ticks_adds_up_to_less_than_a_microjoule_of_rounding() -> None:
             total_j = float(np.add.accumulate(np.concatenate(([total_j], part * unit_j)))[-1])
         assert abs(total_j - exact * unit_j) < 1e-6
         assert total_j == pytest.approx(exact * unit_j, rel=1e-9)
+
+
+def test_a_ledger_that_begins_inside_the_wall_has_a_spring_that_nobody_pressed() -> None:
+    """What it holds was made: a hand that is let out gets it, and the books still balance."""
+    ledger = EnergyLedger()
+    ledger.update(0.0, 0.0, 0.0, 0.5, True, 0.0, 1e-3)
+    assert (ledger.energy_j, ledger.stored_j, ledger.generated_j, ledger.dissipated_j) == (0.0, 0.5, 0.5, 0.0)
+    ledger.update(1e-3, 500.0, 500.0, 0.0, False, 0.0, 1e-3)
+    assert ledger.energy_j == pytest.approx(-0.5)
+    assert ledger.energy_j == pytest.approx(ledger.stored_j + ledger.dissipated_j - ledger.generated_j)
+    assert ledger.debt_j == pytest.approx(0.5)
+
+
+def test_a_cycle_that_begins_inside_the_wall_lasts_from_the_first_entry() -> None:
+    ledger = EnergyLedger()
+    for energy_j in (3.0, 2.0, 1.0, 2.0, 3.0):
+        ledger.update(-(energy_j - ledger.energy_j), 1.0, 0.0, 0.0, True, 4.0, 1e-3)
+    assert ledger.cycle == 1
+    assert ledger.cycle_duration_s == pytest.approx(5e-3)
+    assert ledger.cycle_energy_j == pytest.approx(1.0)

@@ -274,3 +274,14 @@ def test_a_blend_without_a_limit_ends_with_its_ticks() -> None:
     start_blend(state, 0.0, -1e-3, math.inf, 4)
     assert [blended(state, -1e-3, 1e6, 1.0) for _ in range(5)] == [0.0, 2.5e5, 5e5, 7.5e5, 1e6]
     assert not state.blending
+
+
+def test_what_is_not_in_use_of_an_axis_limit_goes_at_once_however_low_it_falls() -> None:
+    """Below 1 N as well: 0.2 N along an axis from the tick after the change, with no force there yet."""
+    for force_n in ([0.0, 0.0, 0.0], [0.1, 0.0, -0.1]):
+        made = armed()
+        made.configure(SafetyConfig(max_axis_force_n=0.2), device(), force_n)
+        assert made.max_axis_n == 0.2
+        asked_n = [5.0, 0.0, 0.0]
+        made.reduce(asked_n, PERIOD_S)
+        assert asked_n[0] == pytest.approx(0.2)

@@ -251,3 +251,17 @@ def test_also_an_endless_workspace_ends_before_infinity(span_m: tuple[float, flo
     assert rig.tick.fault == 0
     rig.force(math.inf)
     assert rig.tick.fault == EventCode.SAMPLE_IMPOSSIBLE
+
+
+def test_once_it_knows_where_it_is_an_impossible_position_is_a_fault() -> None:
+    """Of a device that was not calibrated when the loop began, disarmed as it is."""
+    rig = Rig(wall(2000.0), at_m=0.0, arm=False)
+    rig.sample.calibrated = False
+    rig.sample.position_m[0] = math.nan
+    rig.tick.start(rig.sample)
+    rig.force(math.nan, ticks=5)
+    assert rig.tick.fault == 0
+    rig.sample.calibrated = True
+    rig.force(math.nan)
+    assert rig.tick.fault == EventCode.SAMPLE_IMPOSSIBLE
+    assert rig.tick.guard.latched

@@ -225,3 +225,12 @@ def test_a_law_that_cannot_start_cannot_be_armed() -> None:
     with pytest.raises(PluginError):
         rig.tick.arm()
     assert rig.tick.guard.mode is Mode.DISARMED
+
+
+def test_a_law_that_is_armed_before_the_first_tick_is_told_that_the_device_rests() -> None:
+    told: list[Any] = []
+    watching = law(returns(0.0), lambda _state, _params, snapshot: told.append(snapshot))
+    Rig(wall(2000.0), module=watching, at_m=-4e-3)
+    assert [(snapshot.x_m, snapshot.velocity_m_per_s, snapshot.applied_n) for snapshot in told] == [
+        (-4e-3, 0.0, 0.0)
+    ] * 2

@@ -255,3 +255,18 @@ def test_a_scene_that_comes_during_the_fallback_gets_the_fallback() -> None:
     rig.tick.guard.clear()
     rig.tick.arm()
     assert {contact.law.module.__name__ for contact in rig.tick.contacts} == {"tests.some_law"}
+
+
+def test_a_changed_ramp_reaches_later_ramps() -> None:
+    """Of a release and of a switch alike: 0.2 s, after 0.05 s."""
+    for change in ("release", "stiffer"):
+        rig = pressed()
+        rig.switch(safety=SafetyConfig(ramp_s=0.2, max_speed_m_per_s=100.0))
+        rig.force(-2e-3, ticks=500)
+        if change == "release":
+            rig.tick.release()
+        else:
+            rig.switch(scene(wall(4000.0)))
+        forces = rig.forces(-2e-3, 250)
+        assert forces[198] != pytest.approx(forces[-1], rel=1e-6)
+        assert forces[202:] == [forces[-1]] * 48

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -178,3 +179,57 @@ def test_whatever_a_handle_does_the_force_is_bounded_and_ends(way: list[tuple[in
     assert all(abs(force_n) <= BOUND_N for force_n in handle.forces_n)
     assert handle.forces_n[-1] == 0.0
     assert handle.time_s < 300.0
+
+
+class Drifting(Handle):
+    """A handle that goes a bit further with each push, whichever way it is pushed."""
+
+    def __init__(self, with_n: float, against_n: float) -> None:
+        super().__init__()
+        self.with_n, self.against_n = with_n, against_n
+
+    def push(self, axis: int, force_n: float) -> Moment:
+        step_m = 0.0
+        if force_n > 0.0:
+            step_m = self.with_n
+        elif force_n < 0.0:
+            step_m = self.against_n
+        self.time_s += 1e-3
+        self.position_m += step_m
+        self.forces_n.append(force_n)
+        counts = round(self.position_m / COUNT_M)
+        return Moment(self.time_s, counts * COUNT_M, counts, False)
+
+
+@pytest.mark.parametrize("step_m", [1e-5, -1e-5])
+def test_a_handle_that_moves_by_itself_is_told_in_either_direction(step_m: float) -> None:
+    with pytest.raises(DeviceFaultError, match="moves by itself"):
+        motion.check_sign(drive_of(Drifting(step_m, step_m)))
+
+
+@pytest.mark.parametrize(
+    ("moves_m", "says"),
+    [((1e-5, -1e-5), ""), ((1e-5, 0.0), ""), ((0.0, -1e-5), ""), ((-1e-5, 1e-5), "wrong way"),
+     ((-1e-5, 0.0), "wrong way"), ((0.0, 1e-5), "wrong way"), ((0.0, 0.0), "does not move")],
+)  # fmt: skip
+def test_the_sign_is_told_from_one_direction_where_the_other_is_held(moves_m: tuple[float, float], says: str) -> None:
+    drive = drive_of(Drifting(*moves_m))
+    if says:
+        with pytest.raises(DeviceFaultError, match=says):
+            motion.check_sign(drive)
+    else:
+        motion.check_sign(drive)
+
+
+def test_less_than_half_a_millimetre_tells_no_sign() -> None:
+    """A nudge lasts 0.5 s; 0.45 mm in it is play, and 0.55 mm a motor."""
+    with pytest.raises(DeviceFaultError, match="does not move"):
+        motion.check_sign(drive_of(Drifting(0.9e-6, -0.9e-6)))
+    motion.check_sign(drive_of(Drifting(1.1e-6, -1.1e-6)))
+
+
+def test_where_counts_are_coarse_eight_of_them_tell_the_sign() -> None:
+    coarse = replace(drive_of(Drifting(1.4e-6, -1.4e-6)), count_m=1e-4)  # 0.7 mm are seven counts
+    with pytest.raises(DeviceFaultError, match="does not move"):
+        motion.check_sign(coarse)
+    motion.check_sign(replace(drive_of(Drifting(1.8e-6, -1.8e-6)), count_m=1e-4))

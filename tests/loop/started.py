@@ -1,0 +1,89 @@
+"""A loop with a clock and a device of the test's, from its start to its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from hapticd.config.loading import parse
+from hapticd.device import DeviceInfo, Sample
+from hapticd.driver import Driver, DriverOptions
+from hapticd.errors import DriverError
+from hapticd.loop.loop import ControlLoop
+from hapticd.loop.memory import EventReader, SharedMemory
+from hapticd.tick.assemble import make_tick
+from hapticd.tick.event import LoopEvent
+from hapticd.tick.record import RecordLayout
+from tests.loop.clock import Clock
+from tests.tick.rig import device
+
+WALL = "[[scene.walls]]\nstiffness_n_per_m = 1000.0\n"
+
+
+class AtRest(Driver[DriverOptions]):
+    """A device that stands still.
+
+    Attributes:
+        sample: what it says.
+        before_read: done at each read.
+        refusal: why it lets no forces through, if it does not.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(DriverOptions(), 1e-3)
+        self.sample = Sample(1)
+        self.before_read: Callable[[], None] = lambda: None
+        self.refusal: DriverError | None = None
+
+    def _open(self) -> DeviceInfo:
+        return device()
+
+    def _enable(self) -> None:
+        if self.refusal is not None:
+            raise self.refusal
+
+    def _read(self) -> Sample:
+        self.before_read()
+        return self.sample
+
+    def _write(self, force_n: Sequence[float]) -> None: ...
+
+    def _disable(self) -> None: ...
+
+    def _close(self) -> None: ...
+
+
+class Started:
+    """A loop that runs where it is told to.
+
+    Attributes:
+        told: the events of the run, once it has ended.
+    """
+
+    def __init__(self, clock: Clock, auto_arm: bool = True) -> None:
+        self.clock = clock
+        self.driver = AtRest()
+        self.shared = SharedMemory(RecordLayout(1, False, 8), 1000.0)
+        config = parse(WALL, "started")
+        self.tick = make_tick(config, self.driver.open())
+        settings = config.config
+        self.loop = ControlLoop(
+            self.driver, self.tick, self.shared, settings.loop, settings.safety, auto_arm, self._sleep_until
+        )
+        self.told: list[LoopEvent] = []
+        self._number = 0
+        self._each_tick: Callable[[int], None] = lambda _number: None
+        self._ticks = 0
+
+    def run(self, each_tick: Callable[[int], None], ticks: int) -> None:
+        """Tick so often, and end; `each_tick` is told the number of the one to come."""
+        self._each_tick, self._ticks = each_tick, ticks
+        events = EventReader(self.shared)
+        self.loop.run()
+        self.told = events.read()
+        self.shared.close()
+
+    def _sleep_until(self, deadline_ns: int) -> int:
+        self._each_tick(self._number)
+        self._number += 1
+        self.loop.session.stop_requested = self._number > self._ticks
+        return self.clock.sleep_until(deadline_ns)

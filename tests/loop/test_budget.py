@@ -1,0 +1,58 @@
+"""How many ticks may compute for too long, and when that is asked at all."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import pytest
+
+from hapticd.loop.loop import BUDGET_MISSES, BUDGET_TICKS
+from hapticd.loop.memory import SUPERVISOR_BEAT
+from hapticd.tick.event import EventCode
+from tests.loop.clock import Clock
+from tests.loop.started import Started
+
+FIRST = 20
+"""The first tick that takes long: from there on it is asked how long ticks compute."""
+
+
+def fails(monkeypatch: pytest.MonkeyPatch, long: Collection[int], computes: bool = True) -> bool:
+    """Whether the law fails when these ticks after the first one take 0.6 ms of 1 ms, and compute for it or wait."""
+    clock = Clock(monkeypatch)
+    clock.computed_ns = 0
+    started = Started(clock)
+
+    def each_tick(number: int) -> None:
+        started.shared.words[SUPERVISOR_BEAT] = clock.now_ns
+        duration_s = 0.6e-3 if number - FIRST in {0, *long} else 0.1e-3
+        started.driver.before_read = lambda: spend(duration_s)
+
+    def spend(duration_s: float) -> None:
+        clock.pass_s(duration_s)
+        assert clock.computed_ns is not None
+        clock.computed_ns += round(duration_s * 1e9) if computes else 0
+
+    started.run(each_tick, ticks=80)
+    return EventCode.LAW_OVER_BUDGET in [event.code for event in started.told]
+
+
+def test_three_misses_within_ten_ticks_fail_a_law_and_fewer_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert (BUDGET_MISSES, BUDGET_TICKS) == (3, 10)
+    assert not fails(monkeypatch, [3, 6])
+    assert fails(monkeypatch, [3, 6, 9])
+    assert fails(monkeypatch, [1, 2, 3])
+
+
+def test_the_third_counts_while_the_first_is_less_than_ten_ticks_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert fails(monkeypatch, [3, 6, 12])
+    assert not fails(monkeypatch, [3, 6, 13])
+
+
+def test_the_first_only_has_it_asked_and_ten_ticks_later_that_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert fails(monkeypatch, [10, 11, 12])
+    assert not fails(monkeypatch, [11, 12, 13])
+    assert fails(monkeypatch, [11, 12, 13, 14])
+
+
+def test_a_tick_that_waits_for_its_device_has_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not fails(monkeypatch, range(1, 30), computes=False)

@@ -1,0 +1,61 @@
+"""What a loop begins with: where the device really is, and when it is told."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hapticd.errors import DeviceFaultError
+from hapticd.loop.memory import SUPERVISOR_BEAT
+from hapticd.tick.event import EventCode
+from tests.loop.clock import Clock
+from tests.loop.started import Started
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> Started:
+    made = Started(Clock(monkeypatch))
+    made.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    return made
+
+
+def test_the_first_tick_finds_the_device_at_rest_where_it_is(started: Started) -> None:
+    """And not on the way there from the origin at 40 m/s."""
+    seen: list[tuple[float, float, float]] = []
+    started.driver.sample.position_m[0] = 0.04
+
+    def each_tick(_number: int) -> None:
+        motion = started.tick.motion
+        seen.append((motion.position_m[0], motion.velocity_m_per_s[0], started.tick.contacts[0].x_m))
+
+    started.run(each_tick, 3)
+    assert seen == [(0.04, 0.0, 0.04)] * len(seen)
+    assert len(seen) > 3
+    assert [event.code for event in started.told][:2] == [EventCode.STARTED, EventCode.ARMED]
+
+
+@pytest.mark.parametrize("at_m", [math.nan, 7.0])
+def test_an_impossible_first_sample_is_a_fault_also_of_a_disarmed_device(
+    monkeypatch: pytest.MonkeyPatch, at_m: float
+) -> None:
+    started = Started(Clock(monkeypatch), auto_arm=False)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    started.driver.sample.position_m[0] = at_m
+    started.run(lambda _number: None, 3)
+    assert [event.code for event in started.told] == [EventCode.STARTED, EventCode.SAMPLE_IMPOSSIBLE]
+    assert started.tick.guard.latched
+
+
+def test_a_device_that_refuses_stays_disarmed_and_says_why(started: Started) -> None:
+    started.driver.refusal = DeviceFaultError("its button is pressed")
+    started.run(lambda _number: None, 3)
+    assert [event.code for event in started.told] == [EventCode.STARTED, EventCode.DISARMED]
+    assert started.told[1].text == "stays disarmed: its button is pressed"
+
+
+def test_an_event_before_the_first_tick_has_the_time_that_it_is(started: Started) -> None:
+    now_ns = started.clock.now_ns
+    started.run(lambda _number: None, 3)
+    assert [event.deadline_ns >= now_ns for event in started.told] == [True] * len(started.told)
+    assert len(started.told) >= 2
