@@ -71,6 +71,8 @@ $(PAGE_VENDOR)/uPlot.esm.js: views/package.json views/package-lock.json
 nightly: packages web $(READY)
 	$(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
+	REPEAT=50 $(BIN)/pytest tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views \
+		--timeout 7200 --override-ini faulthandler_timeout=7260
 
 bench: $(READY)
 	$(BIN)/hapticd bench tick

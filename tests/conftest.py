@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests import repeating
 from tests.examples import TIMES, examples
 
 IN_CI = os.environ.get("CI") == "true"
@@ -27,6 +29,8 @@ def pytest_configure() -> None:
     """Give every child the signals that a terminal gives it: a runner in the background has them ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    if repeating.REPEAT > 1:
+        repeating.watch_for_daemons()
 
 
 @pytest.fixture(scope="session")
@@ -45,6 +49,18 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site-packages")
     return folder / "site-packages"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def busy() -> Generator[None, None, None]:
+    """Where tests are repeated they run beside a busy processor."""
+    with repeating.busy_processor() if repeating.REPEAT > 1 else contextlib.nullcontext():
+        yield
+
+
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Repeat a test that starts a daemon, where that is asked for."""
+    return repeating.repeated(item, nextitem) if repeating.REPEAT > 1 else None
 
 
 @pytest.hookimpl(wrapper=True)

@@ -14,7 +14,8 @@ from tests.faults.rig import Rig, events_until
     [
         ("max_axis_force_n = 5.0", 5.0),
         ("max_force_n = 7.0\nmax_axis_force_n = 9.0", 7.0),
-        ('profile = "simulation"', 0.0),
+        ('profile = "simulation"', 12.0),
+        ('profile = "simulation"\n[device.options]\nmax_force_n = 0.0', 0.0),
     ],
 )
 def test_the_status_names_the_smallest_limit_that_holds(safety: str, limit_n: float) -> None:

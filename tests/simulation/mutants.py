@@ -33,6 +33,10 @@ _COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
 _OTHER_NAME = {"min": "max", "max": "min"}
 
 
+Change = tuple[str, Callable[[Any], None]]
+"""What is done to a node, in words and in deed."""
+
+
 @dataclass(frozen=True, slots=True)
 class Mutant:
     """One slip.
@@ -96,41 +100,25 @@ def mutants(function: Callable[..., Any], switches: Collection[str] = (), apart:
     for at, node in enumerate(ast.walk(original)):
         if node not in homes:
             continue
-        for label, change in _changes(node, switches, homes):
+        for label, change in changes(node, switches, homes):
             found.append(Mutant(function.__qualname__, f"{homes[node]}  [{label}]", original, at, change))
     return found
 
 
-def _homes(original: ast.FunctionDef, apart: frozenset[str]) -> tuple[dict[ast.AST, str], set[str]]:
-    """The first line of the statement that each node is in, but for those in `apart`; and what of `apart` is left."""
-    homes: dict[ast.AST, str] = {}
-    left = set(apart)
+def changes(node: ast.AST, switches: Collection[str], homes: Collection[ast.AST]) -> Iterator[Change]:
+    """What may be done to the same node of a copy.
 
-    def enter(node: ast.AST, home: str) -> None:
-        if isinstance(node, ast.stmt | ast.ExceptHandler):
-            home = _line(node)
-            if home in apart:
-                left.discard(home)
-                return
-        homes[node] = home
-        for child in ast.iter_child_nodes(node):
-            enter(child, home)
-
-    enter(original, "")
-    return homes, left
-
-
-_Change = tuple[str, Callable[[Any], None]]
-
-
-def _changes(node: ast.AST, switches: Collection[str], homes: Collection[ast.AST]) -> Iterator[_Change]:
-    """What may be done to the same node of a copy."""
+    Args:
+        node: a node.
+        switches: names whose tests are left alone.
+        homes: nodes that may be changed; statements that are not among them are not left out.
+    """
     for field in ("body", "orelse"):
         statements = getattr(node, field, None)
         if isinstance(statements, list):
             for index, statement in enumerate(statements):
                 if statement in homes and not isinstance(statement, ast.Pass):
-                    yield f"without {_line(statement)}", _without(field, index)
+                    yield f"without {first_line(statement)}", _without(field, index)
     match node:
         case ast.Compare(ops=operators):
             for index, operator in enumerate(operators):
@@ -138,11 +126,11 @@ def _changes(node: ast.AST, switches: Collection[str], homes: Collection[ast.AST
                     yield f"{type(operator).__name__} {index} is {other.__name__}", _setting_item("ops", index, other())
         case ast.BinOp(op=operator) | ast.AugAssign(op=operator) if type(operator) in _COMPUTED:
             other_way = _COMPUTED[type(operator)]
-            yield f"{other_way.__name__} in {_line(node)}", _setting("op", other_way())
+            yield f"{other_way.__name__} in {first_line(node)}", _setting("op", other_way())
         case ast.BoolOp(op=operator, values=[first, *_]) if not _is_switch(first, switches):
             yield "and is or, or is and", _setting("op", ast.Or() if isinstance(operator, ast.And) else ast.And())
         case ast.UnaryOp():
-            yield f"{_line(node)} turned round", _dropping_sign
+            yield f"{first_line(node)} turned round", _dropping_sign
         case ast.Constant(value=bool(value)):
             yield f"{value} is {not value}", _setting("value", not value)
         case ast.Constant(value=int(value) | float(value)):
@@ -153,14 +141,34 @@ def _changes(node: ast.AST, switches: Collection[str], homes: Collection[ast.AST
             yield "turned round", _turning_round
         case ast.Assign(targets=targets) if len(targets) > 1:
             for index, target in enumerate(targets):
-                yield f"without {_line(target)}", _without("targets", index)
+                yield f"without {first_line(target)}", _without("targets", index)
         case ast.Call(args=arguments):
             for index, argument in enumerate(arguments[:-1]):
-                yield f"{_line(argument)} one later", _swapping(index)
+                yield f"{first_line(argument)} one later", _swapping(index)
 
 
-def _line(node: ast.AST) -> str:
+def first_line(node: ast.AST) -> str:
+    """A node as it is written, or the first line of it."""
     return ast.unparse(node).splitlines()[0]
+
+
+def _homes(original: ast.FunctionDef, apart: frozenset[str]) -> tuple[dict[ast.AST, str], set[str]]:
+    """The first line of the statement that each node is in, but for those in `apart`; and what of `apart` is left."""
+    homes: dict[ast.AST, str] = {}
+    left = set(apart)
+
+    def enter(node: ast.AST, home: str) -> None:
+        if isinstance(node, ast.stmt | ast.ExceptHandler):
+            home = first_line(node)
+            if home in apart:
+                left.discard(home)
+                return
+        homes[node] = home
+        for child in ast.iter_child_nodes(node):
+            enter(child, home)
+
+    enter(original, "")
+    return homes, left
 
 
 def _is_switch(test: ast.expr, switches: Collection[str]) -> bool:

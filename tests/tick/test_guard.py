@@ -285,3 +285,26 @@ def test_what_is_not_in_use_of_an_axis_limit_goes_at_once_however_low_it_falls()
         asked_n = [5.0, 0.0, 0.0]
         made.reduce(asked_n, PERIOD_S)
         assert asked_n[0] == pytest.approx(0.2)
+
+
+def test_after_a_blend_its_bound_opens_over_as_many_ticks_again() -> None:
+    """A force that asks for ten times the limit: F = limit / (2 - w) from w = 1 on, and all of it at w = 2."""
+    state = SimpleNamespace()
+    start_blend(state, 4.0, -1e-3, 12.0, 10)
+    forces_n = [blended(state, -1e-3, 120.0, 1.0) for _ in range(21)]
+    assert forces_n[5] == pytest.approx(0.5 * 4.0 + 0.5 * 12.0)
+    assert forces_n[10:20] == pytest.approx([12.0 / (1.0 - 0.1 * done) for done in range(10)])
+    assert forces_n[20] == 120.0
+    assert not state.blending
+
+
+def test_limits_that_are_under_way_arrive_while_the_device_is_disarmed() -> None:
+    """Dropped in the middle of their ramp, as where a position is lost."""
+    made = armed(ramp_s=0.05, max_force_n=2.0)
+    made.configure(SafetyConfig(ramp_s=0.05, max_force_n=10.0), device(), [2.0, 0.0, 0.0])
+    made.reduce([0.0, 0.0, 0.0], PERIOD_S)
+    made.reduce([0.0, 0.0, 0.0], PERIOD_S)
+    made.drop()
+    for _ in range(60):
+        made.reduce([0.0, 0.0, 0.0], PERIOD_S)
+    assert (made.max_force_n, made.max_axis_n, made.limit_n) == (10.0, 10.0, 10.0)

@@ -1,0 +1,84 @@
+"""The rooms where a fault reaches a hand or lets someone in, and the tests that belong to each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LAWS = (
+    "none",
+    "damper",
+    "energy_bounding",
+    "input_to_state",
+    "set_position",
+    "tdpa",
+    "virtual_coupling",
+    "ring_damping",
+    "energy_cycle",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """Some files, and what tests them.
+
+    Attributes:
+        files: below the root.
+        tests: what pytest is told to run, those that are quick or find most first.
+        select: its `-k`.
+    """
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+    select: str = ""
+
+
+def _law(name: str) -> Room:
+    own = () if name == "none" else (f"tests/controllers/test_{name}.py",)
+    select = f"test_{name} or {name.title().replace('_', '')}"
+    return Room((f"controllers/hapticd_controllers/{name}.py",), (*own, "tests/controllers/test_every_law.py"), select)
+
+
+def _tick(*names: str) -> tuple[str, ...]:
+    return tuple(f"tests/tick/test_{name}.py" for name in names)
+
+
+ROOMS = {
+    "guard": Room(
+        ("hapticd/tick/guard.py",),
+        _tick("guard", "tick_transitions", "tick_books", "tick_motion"),
+    ),
+    "energy": Room(("hapticd/tick/energy.py",), _tick("energy", "contact", "tick_books")),
+    "tick": Room(
+        tuple(f"hapticd/tick/{name}.py" for name in ("tick", "contact", "motion", "arrangement")),
+        ("tests/tick",),
+    ),
+    "velocity": Room(("hapticd/tick/velocity.py",), _tick("velocity", "tick_motion")),
+    "scene": Room(("hapticd/tick/scene.py",), _tick("scene", "wall_changes", "switching", "tick_transitions")),
+    "loop": Room(
+        tuple(f"hapticd/loop/{name}.py" for name in ("loop", "session", "requests", "memory", "resume")),
+        tuple(
+            f"tests/loop/test_{name}.py"
+            for name in (
+                "loop", "start", "budget", "ramps", "requests", "disarming", "leaving", "memory", "any_order_mutants",
+                "any_order",
+            )
+        ),
+    ),
+    **{name: _law(name) for name in LAWS},
+    "recovery": Room(
+        ("hapticd/supervisor/recovery.py", "hapticd/loop/resume.py"),
+        ("tests/daemon/test_recovery.py", "tests/daemon/test_plugged_in.py", "tests/loop/test_leaving.py"),
+    ),
+    "keys": Room(
+        tuple(f"hapticd/keys/{name}.py" for name in ("connections", "file", "heartbeat", "policy", "server", "store")),
+        ("tests/keys",),
+    ),
+    "rig": Room(
+        tuple(f"drivers/hapticd_drivers/rig/{name}.py" for name in ("messages", "frames", "conversation", "mapping")),
+        tuple(
+            f"tests/drivers/rig/test_{name}.py"
+            for name in ("messages", "conversation", "mapping", "serial_driver", "serial_faults")
+        ),
+    ),
+    "motion of the rig": Room(("drivers/hapticd_drivers/rig/motion.py",), ("tests/drivers/rig/test_motion.py",)),
+}  # fmt: skip

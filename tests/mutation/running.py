@@ -1,0 +1,178 @@
+"""Run a room's tests on copies of the tree with one slip each; the checkout itself is never changed.
+
+    python -m tests.mutation.running guard energy --slips 40 --seed 1
+
+mutmut and cosmic-ray were looked at. The one puts a switch around every function, whose source the compiler of the laws
+then reads instead of the function's own; the other changes the checkout in place, one slip after the other. Neither
+draws a sample by a seed. What a slip is comes from `tests.simulation.mutants`, as for kernel and tick.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+
+from tests.mutation.harmless import HARMLESS
+from tests.mutation.rooms import ROOMS, Room
+from tests.mutation.slips import Slip, slips
+
+ROOT = Path(__file__).parents[2]
+SOURCES = ("hapticd", "drivers", "controllers", "studies", "benchmarks", "views")
+COPIED = (*SOURCES, "tests", "config", "docs", "systemd", "pyproject.toml", "README.md", "CHANGELOG.md", "Makefile")
+PARALLEL = 2
+LEAST_S = 60.0
+"""Shortest time limit of a run [s]; a run that takes longer than five times that of the tree as it is has noticed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What became of the slips of a room.
+
+    Attributes:
+        made: how many were tried.
+        survivors: those that no test noticed and that are not known to change nothing.
+        harmless: those that no test noticed and that change nothing.
+    """
+
+    made: int
+    survivors: list[Slip]
+    harmless: list[Slip]
+
+    @property
+    def share_found(self) -> float:
+        """Found, of those that change something."""
+        telling = self.made - len(self.harmless)
+        return 1.0 - len(self.survivors) / telling if telling else 1.0
+
+    def __str__(self) -> str:
+        found = self.made - len(self.survivors) - len(self.harmless)
+        return (
+            f"{self.made} slips: {found} found, {len(self.harmless)} change nothing, {len(self.survivors)} survive: "
+            f"{100.0 * self.share_found:.1f} % found"
+        )
+
+
+def sample(room: Room, count: int, seed: int) -> list[Slip]:
+    """So many slips of a room, drawn at random; all of them where there are no more."""
+    all_slips = [slip for file in room.files for slip in slips(ROOT, file)]
+    return random.Random(seed).sample(all_slips, min(count, len(all_slips)))
+
+
+def judge(
+    room: Room,
+    chosen: Sequence[Slip],
+    parallel: int = PARALLEL,
+    progress: Callable[[Slip, bool], None] = lambda _slip, _lives: None,
+) -> Verdict:
+    """Try slips, several at a time.
+
+    Args:
+        room: where they are.
+        chosen: the slips.
+        parallel: how many copies of the tree there are.
+        progress: told of each slip whether it lives.
+
+    Raises:
+        RuntimeError: the tests fail on the tree as it is.
+    """
+    with tempfile.TemporaryDirectory(prefix="mutation-") as place:
+        free: SimpleQueue[Path] = SimpleQueue()
+        for number in range(parallel):
+            free.put(_copy(Path(place) / str(number)))
+        tree = free.get()
+        started_s = time.monotonic()
+        if not _passes(tree, room, 3600.0):
+            raise RuntimeError(f"the tests fail without any slip: {' '.join(room.tests)}")
+        limit_s = max(LEAST_S, 5.0 * (time.monotonic() - started_s))
+        free.put(tree)
+
+        def survives(slip: Slip) -> bool:
+            mine = free.get()
+            file = mine / slip.file
+            source = file.read_text()
+            try:
+                file.write_text(slip.into(source))
+                lives = _passes(mine, room, limit_s)
+                progress(slip, lives)
+                return lives
+            finally:
+                file.write_text(source)
+                free.put(mine)
+
+        with ThreadPoolExecutor(parallel) as pool:
+            alive = [slip for slip, lives in zip(chosen, pool.map(survives, chosen), strict=True) if lives]
+    harmless = [slip for slip in alive if str(slip) in HARMLESS]
+    return Verdict(len(chosen), [slip for slip in alive if slip not in harmless], harmless)
+
+
+def told(survivors: Iterable[Slip]) -> str:
+    """The survivors, each with what it changes."""
+    return "\n\n".join(f"{slip}\n{slip.diff((ROOT / slip.file).read_text())}" for slip in survivors)
+
+
+def _copy(to: Path) -> Path:
+    to.mkdir()
+    for name in COPIED:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, to / name, ignore=shutil.ignore_patterns("__pycache__", "build", "node_modules"))
+        else:
+            shutil.copy(source, to / name)
+    return to
+
+
+def _passes(tree: Path, room: Room, limit_s: float) -> bool:
+    """Whether the room's tests pass on a tree in the time given; a run that is cut short is ended with its children."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *room.tests]
+    if room.select:
+        command += ["-k", room.select]
+    paths = os.pathsep.join(str(tree / source) for source in ("", *SOURCES[1:]))
+    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1", "CI": "false"}
+    running = subprocess.Popen(
+        command, cwd=tree, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    try:
+        return running.wait(limit_s) == 0
+    except subprocess.TimeoutExpired:
+        return False
+    finally:
+        if running.poll() is None:
+            os.killpg(running.pid, signal.SIGKILL)
+            running.wait()
+
+
+def _tell(slip: Slip, lives: bool) -> None:
+    if lives and str(slip) not in HARMLESS:
+        sys.stderr.write(f"survives: {slip}\n{slip.diff((ROOT / slip.file).read_text())}\n")
+    else:
+        sys.stderr.write(".")
+    sys.stderr.flush()
+
+
+def main() -> None:
+    """Try a sample of each room that is named, and list what survives."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("rooms", nargs="*", default=list(ROOMS))
+    parser.add_argument("--slips", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    for name in arguments.rooms:
+        verdict = judge(ROOMS[name], sample(ROOMS[name], arguments.slips, arguments.seed), progress=_tell)
+        sys.stdout.write(f"{name}: {verdict}\n{told(verdict.survivors)}\n\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

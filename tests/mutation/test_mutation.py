@@ -1,0 +1,82 @@
+"""The tests notice what goes wrong: slips drawn at random, each in a copy of the tree, and the room's own tests."""
+
+from __future__ import annotations
+
+import ast
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.mutation.harmless import EQUAL
+from tests.mutation.rooms import LAWS, ROOMS, Room
+from tests.mutation.running import ROOT, judge, sample, told
+from tests.mutation.slips import slips
+
+SEED = int(os.environ.get("SEED", "1"))
+NIGHTLY_SLIPS = 40
+LEAST_SHARE = 0.95
+
+QUICK = {
+    "guard": Room(("hapticd/tick/guard.py",), ("tests/tick/test_guard.py",)),
+    "energy": Room(("hapticd/tick/energy.py",), ("tests/tick/test_energy.py",)),
+}
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_every_slip_of_a_small_sample_is_found(name: str) -> None:
+    """Six of each, always the same ones, by the tests of the module alone."""
+    verdict = judge(QUICK[name], sample(QUICK[name], 6, seed=4))
+    assert verdict.made == 6
+    assert not verdict.survivors, told(verdict.survivors)
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(6 * 3600)
+@pytest.mark.parametrize("name", ROOMS)
+def test_nearly_every_slip_is_found(name: str) -> None:
+    verdict = judge(ROOMS[name], sample(ROOMS[name], NIGHTLY_SLIPS, SEED))
+    assert verdict.share_found >= LEAST_SHARE, f"{verdict}\n{told(verdict.survivors)}"
+
+
+def test_every_law_has_its_slips() -> None:
+    laws = (ROOT / "controllers" / "hapticd_controllers").glob("[a-z]*.py")
+    assert sorted(LAWS) == sorted(law.stem for law in laws)
+
+
+def test_what_is_named_harmless_is_a_slip_that_there_is() -> None:
+    """A line that was changed is looked at anew."""
+    named = [slip for named in EQUAL.values() for slip in named]
+    there = {str(slip) for file in {slip.split(":")[0] for slip in named} for slip in slips(ROOT, file)}
+    assert [slip for slip in named if slip not in there] == []
+    assert len(named) == len(set(named))
+
+
+SOURCE = '''
+LIMIT = 2.5
+def larger(a: float, b: int = 3) -> float:
+    """The larger of two."""
+    if a < b:
+        raise ValueError(f"{a + 1} is too small")
+    return max(a, b)
+'''
+
+
+def test_a_file_has_the_slips_of_its_functions_and_numbers(tmp_path: Path) -> None:
+    """And none in what it says, in its annotations or in what it tells people."""
+    (tmp_path / "some.py").write_text(SOURCE)
+    found = slips(tmp_path, "some.py")
+    assert [slip.what for slip in found] == [
+        "def larger  [without if a < b:]",
+        "def larger  [without return max(a, b)]",
+        "LIMIT = 2.5  [2.5 is 5.0]",
+        "if a < b:  [without raise ValueError(f'{a + 1} is too small')]",
+        "if a < b:  [turned round]",
+        "if a < b:  [Lt 0 is LtE]",
+        "if a < b:  [Lt 0 is Gt]",
+        "return max(a, b)  [min]",
+    ]
+    for slip in found:
+        mutant = slip.into(SOURCE)
+        assert mutant != ast.unparse(ast.parse(SOURCE)) + "\n"
+        assert len([line for line in slip.diff(SOURCE).splitlines() if line.startswith(("-", "+"))]) >= 3

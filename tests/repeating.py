@@ -1,0 +1,67 @@
+"""Every test that starts a daemon, many times over beside a busy processor: a verdict that hangs on luck shows so.
+
+`REPEAT=50 pytest tests/daemon` is what the nightly run has. A test that starts none runs once, as always.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+REPEAT = int(os.environ.get("REPEAT", "1"))
+_SPIN = "import os; os.sched_setaffinity(0, {{{cpu}}})\nwhile os.getppid() == {parent}: pass"
+
+_started = 0
+
+
+def watch_for_daemons() -> None:
+    """Count the daemons that this process starts, by whatever way it starts them."""
+
+    def hear(event: str, arguments: tuple[Any, ...]) -> None:
+        global _started
+        if event == "subprocess.Popen" and _is_daemon(arguments[1]):
+            _started += 1
+
+    sys.addaudithook(hear)
+
+
+def repeated(item: pytest.Item, next_item: pytest.Item | None) -> bool:
+    """Run a test, and again as often as `REPEAT` says if it has started a daemon; the first that fails is the last."""
+    hook = item.ihook
+    hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for number in range(REPEAT):
+        before = _started
+        reports = runtestprotocol(item, nextitem=next_item, log=False)
+        failed = any(report.failed for report in reports)
+        if failed:
+            for report in reports:
+                report.sections.append(("repeat", f"in run {number + 1} of {REPEAT}"))
+        if failed or _started == before or number == REPEAT - 1:
+            for report in reports:
+                hook.pytest_runtest_logreport(report=report)
+            break
+    hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+@contextlib.contextmanager
+def busy_processor() -> Iterator[None]:
+    """A program that spins on the processor on which a daemon's loop is."""
+    spin = _SPIN.format(cpu=max(os.sched_getaffinity(0)), parent=os.getpid())
+    with subprocess.Popen([sys.executable, "-c", spin]) as spinning:
+        try:
+            yield
+        finally:
+            spinning.kill()
+
+
+def _is_daemon(command: Any) -> bool:
+    words = [os.fsdecode(word) for word in command] if isinstance(command, list | tuple) else [str(command)]
+    return "run" in words and any(word.rsplit("/", 1)[-1] == "hapticd" for word in words)
