@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 import shutil
 import subprocess
@@ -18,9 +19,12 @@ from hapticd.telemetry import wire
 from hapticd.telemetry.records import LATE_EDGES_US, Status
 from hapticd.telemetry.wire import Topic
 from hapticd.tick.event import LoopEvent
+from hapticd_views.recording import messages
+from tests.daemon.running import Daemon
 from tests.telemetry.sockets import Wire, served, ticks, wait_until
 
-DOCS = Path(__file__).parent.parent.parent / "docs"
+ROOT = Path(__file__).parent.parent.parent
+DOCS = ROOT / "docs"
 PAGE = (DOCS / "telemetry.md").read_text()
 COMMON = {"timestamp", "seq", "invalid", "fields"}
 
@@ -52,7 +56,9 @@ def test_the_edges_of_the_histogram_are_those_of_the_page() -> None:
     assert f"version of this contract: {wire.SCHEMA};" in PAGE
 
 
-@pytest.mark.parametrize(("language", "name"), [("python", "subscribe.py"), ("cpp", "subscribe.cpp")])
+@pytest.mark.parametrize(
+    ("language", "name"), [("python", "subscribe.py"), ("cpp", "subscribe.cpp"), ("js", "javascript/subscribe.mjs")]
+)
 def test_the_page_shows_the_examples_as_they_are(language: str, name: str) -> None:
     assert f"`docs/examples/{name}`:\n\n```{language}\n{(DOCS / 'examples' / name).read_text()}```\n" in PAGE
 
@@ -122,9 +128,11 @@ def test_the_cpp_example_prints_what_happened(tmp_path: Path) -> None:
     assert_true(printed_by([tmp_path / "subscribe"]))
 
 
-def test_the_plotjuggler_layout_names_series_that_exist() -> None:
-    """PlotJuggler calls a number topic/key, and an element of an array topic/key[i]."""
+def series(axes: int) -> set[str]:
+    """What PlotJuggler makes of a tick: a number is topic/key, an element of an array topic/key[i]."""
     record = ticks(1)[0]
+    for name in ("position_m", "velocity_m_per_s", "force_n", "force_requested_n"):
+        setattr(record, name, getattr(record, name) * axes)
     maps = {
         Topic.POSITION: wire.position_map(record, 0.0),
         Topic.ENERGY: wire.energy_map(record, 0.0),
@@ -132,14 +140,79 @@ def test_the_plotjuggler_layout_names_series_that_exist() -> None:
         Topic.TIMING: wire.timing_map(record, 0.0),
         Topic.CYCLE: wire.cycle_map(record, 0.0, 0),
     }
-    series = set()
+    found = set()
     for topic, fields in maps.items():
         for key, value in fields.items():
             many = isinstance(value, list | tuple)
-            series |= {f"{topic}/{key}[{index}]" for index in range(len(value))} if many else {f"{topic}/{key}"}
-    curves = {curve.get("name") for curve in ElementTree.parse(DOCS / "examples" / "plotjuggler.xml").iter("curve")}
-    assert curves
-    assert curves <= series
+            found |= {f"{topic}/{key}[{index}]" for index in range(len(value))} if many else {f"{topic}/{key}"}
+    return found
+
+
+@pytest.mark.parametrize(("name", "axes"), [("plotjuggler.xml", 1), ("plotjuggler-3-axes.xml", 3)])
+def test_a_plotjuggler_layout_names_series_that_exist(name: str, axes: int) -> None:
+    drawn = list(ElementTree.parse(DOCS / "examples" / name).iter("curve"))
+    curves = {str(curve.get("name")) for curve in drawn}
+    assert len(curves) == len(drawn) > 8
+    assert curves <= series(axes)
+    assert {curve for curve in curves if curve.startswith("hapticd/position/position_m")} == {
+        f"hapticd/position/position_m[{axis}]" for axis in range(axes)
+    }
+
+
+@pytest.mark.parametrize("name", ["plotjuggler.xml", "plotjuggler-3-axes.xml"])
+def test_a_recording_has_the_series_of_the_layouts_too(name: str) -> None:
+    """Its channels have the topics' names, and JSON schemas by which PlotJuggler takes messages apart."""
+    schemas = {messages.topic_of(kind): messages.schema_of(kind)["properties"] for kind in messages.TELEMETRY}
+    for curve in ElementTree.parse(DOCS / "examples" / name).iter("curve"):
+        topic, _, key = str(curve.get("name")).rpartition("/")
+        key, element, _ = key.partition("[")
+        assert schemas[topic][key]["type"] == ("array" if element else "integer" if key == "cycle" else "number")
+
+
+@pytest.fixture(scope="module")
+def javascript(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example with what its lock file names, as `npm ci` gets it."""
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("apt install npm")
+    folder = tmp_path_factory.mktemp("javascript")
+    for name in ("package.json", "package-lock.json", "subscribe.mjs"):
+        shutil.copy(DOCS / "examples" / "javascript" / name, folder)
+    command = [npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / "subscribe.mjs"
+
+
+def test_the_javascript_example_prints_what_happened(javascript: Path) -> None:
+    assert_true(printed_by(["node", javascript]))
+
+
+def test_the_javascript_example_reads_a_running_daemon(javascript: Path) -> None:
+    with Daemon((ROOT / "config" / "hapticd.toml").read_text()).wait_ready() as daemon:
+        command = ["node", str(javascript), daemon.endpoint]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as subscriber:
+            try:
+                assert subscriber.stdout is not None
+                lines: list[list[str]] = []
+                while sum(line[0] == "tick" for line in lines) < 3:
+                    lines.append(subscriber.stdout.readline().split())
+                    assert lines[-1], f"it ended after {lines}"
+            finally:
+                subscriber.kill()
+    seen = [int(line[1]) for line in lines if line[0] == "tick"]
+    assert seen == [seen[0], seen[0] + 500, seen[0] + 1000]
+    assert not [line for line in lines if line[0] == "lost"]
+
+
+def test_the_lock_file_names_no_place() -> None:
+    """Packages come from whatever registry npm is set to, and are known by their hashes."""
+    lock = json.loads((DOCS / "examples" / "javascript" / "package-lock.json").read_text())
+    packages = [package for name, package in lock["packages"].items() if name]
+    assert len(packages) >= 2
+    for package in packages:
+        assert "resolved" not in package
+        assert package["integrity"].startswith("sha512-")
 
 
 def test_a_status_is_documented_in_full() -> None:
