@@ -19,7 +19,7 @@ class Stage:
 
     def __init__(self) -> None:
         self._wire = Wire(say_status=False)
-        self._play: queue.Queue[list[TickRecord] | LoopEvent | int] = queue.Queue()
+        self._play: queue.Queue[list[TickRecord] | LoopEvent | int | tuple[str, object]] = queue.Queue()
         self._status = Status(version="1.2.3", law="energy-cycle", rate_hz=1000.0, axes=("z",)).as_map()
         self._over = threading.Event()
         self.endpoint = self._wire.endpoint
@@ -47,6 +47,10 @@ class Stage:
         """Have statuses of this schema published, now and from now on."""
         self._play.put(schema)
 
+    def forge(self, topic: str, payload: object) -> None:
+        """Have something published that no daemon would."""
+        self._play.put((topic, payload))
+
     def _run(self) -> None:
         publisher = self._wire.publisher
         due_s, schema = 0.0, SCHEMA
@@ -61,6 +65,8 @@ class Stage:
                     publisher.flush(time.monotonic_ns() + 10**18)
                 case LoopEvent():
                     publisher.event(item)
+                case (str(topic), payload):
+                    self._wire.say(topic, payload)
                 case int():
                     schema, due_s = item, 0.0
             publisher.service()

@@ -107,6 +107,12 @@ def test_another_number_of_axes_begins_another_frame() -> None:
     assert [(frame["axes"], len(frame["t"])) for frame in frames] == [(1, 1), (3, 2)]
 
 
+def test_a_tick_that_makes_no_sense_is_left_out() -> None:
+    odd = Position(0.0, 0, (0.0, 0.0), (0.0,), (0.0,), (0.0, 0.0))
+    (frame,) = unpacked(packed(joined(odd, *parts(0)[1:], *parts(1)).take()))
+    assert frame["seq0"] == 1
+
+
 def test_a_number_that_32_bits_do_not_hold_stops_nothing() -> None:
     position = Position(0.0, 0, (1e300,), (0.0,), (0.0,), (0.0,))
     (frame,) = unpacked(packed(joined(position, *parts(0)[1:]).take()))

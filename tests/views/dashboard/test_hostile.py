@@ -155,7 +155,7 @@ def test_nothing_but_the_page_is_to_be_had(served: Served, path: str) -> None:
     assert get(served, path)[0] == 404
 
 
-@pytest.mark.parametrize("token", ["", "x", "ü", "a" * 100])
+@pytest.mark.parametrize("token", ["", "x", "ü"])
 @pytest.mark.parametrize("do", ["arm", "disarm", "clear", "edit"])
 def test_without_the_token_nothing_is_commanded(served: Served, daemon: Daemon, do: str, token: str) -> None:
     before = daemon.output()
@@ -185,6 +185,8 @@ def test_without_the_token_nothing_is_commanded(served: Served, daemon: Daemon, 
         '{"do": "edit", "hash": "", "law": "none", "values": {"safety.max_force_n": NaN}}',
         '{"do": "edit", "hash": "", "law": "none", "values": {"safety.max_force_n": [1]}}',
         '{"do": "edit", "hash": "", "law": 1}',
+        '{"do": "edit", "hash": "", "law": "\\ud800", "values": {}}',
+        '{"do": "edit", "hash": "", "law": "none", "values": {"safety.max_force_n": 1e999}}',
         "[" * 10_000,
         b"\x00\xff",
     ],
@@ -227,9 +229,12 @@ def test_an_oversized_message_ends_its_connection_and_no_other(served: Served) -
     is_well(served)
 
 
-def test_who_does_not_say_hello_gets_nothing(served: Served) -> None:
+@pytest.mark.parametrize(
+    "first", ['{"do": "disarm", "id": 1}', '{"do": "hello", "token": "\\ud800"}', '{"do": "hello", "token": 1}', "\0"]
+)
+def test_who_does_not_say_hello_gets_nothing(served: Served, first: str) -> None:
     with open_socket(served) as socket:
-        socket.send('{"do": "disarm", "id": 1}')
+        socket.send(first)
         with pytest.raises(ConnectionClosed):
             socket.recv(PATIENCE_S)
 

@@ -20,7 +20,7 @@ LARGE_AT, SMALL_AT = 20_500, 45_123
 LARGE_N = 8.0
 """A spike that sets the scale."""
 
-CHUNK = 5_000
+CHUNK = 2_500
 """Ticks that fit into what ZeroMQ keeps for a reader that is busy."""
 
 
@@ -66,10 +66,9 @@ def trace(picture: npt.NDArray[np.uint8], chart: dict[str, float]) -> npt.NDArra
     return np.asarray(blue - red > 60)
 
 
-def test_a_late_viewer_sees_the_last_minute_and_every_tick_of_it(
-    browser: Browser, stage: Stage, served: Served
-) -> None:
-    """One spike is large. The other is as high as one row of pixels, and lasts for a sixtieth of a column."""
+@pytest.fixture(scope="module", autouse=True)
+def row_n(browser: Browser, stage: Stage, served: Served) -> float:
+    """The minute. One spike is large; another is as high as one row of pixels [N], and lasts a sixtieth of a column."""
     records = still(TICKS)
     records[LARGE_AT].force_n = (LARGE_N,)
     with browser.page(served.watch) as page:
@@ -82,6 +81,12 @@ def test_a_late_viewer_sees_the_last_minute_and_every_tick_of_it(
         assert 0.05 < row_n < 0.5
         records[SMALL_AT].force_n = (row_n,)
         play(stage, page, records[30_000:])
+    return float(row_n)
+
+
+def test_a_late_viewer_sees_the_last_minute_and_every_tick_of_it(
+    browser: Browser, served: Served, row_n: float
+) -> None:
     with browser.page(served.watch) as late:
         has_come(late, TICKS - 1)
         ring = "page.store.ring"
@@ -132,6 +137,18 @@ def test_a_daemon_of_another_schema_is_said_and_its_ticks_are_not_shown(
         page.wait_for("document.getElementById('trouble').hidden")
         stage.play(still(100, TICKS + 100))
         page.wait_inside(f"page.store.lastSeq === {TICKS + 199}")
+
+
+@pytest.mark.parametrize("payload", ["text", [1], [{"seq": 1}], [{"timestamp": 0.0, "seq": "x"}]])
+def test_a_forged_message_of_the_daemon_is_said_and_what_follows_is_shown(
+    browser: Browser, stage: Stage, served: Served, payload: object
+) -> None:
+    with browser.page(served.watch) as page:
+        last = TICKS + 199
+        has_come(page, last)
+        stage.forge("hapticd/position", payload)
+        page.wait_for("document.getElementById('trouble').innerText.includes('hapticd/position')")
+        page.wait_for("document.getElementById('trouble').hidden")
 
 
 def test_lost_ticks_are_counted_and_a_restart_is_not_a_loss(browser: Browser, stage: Stage, served: Served) -> None:

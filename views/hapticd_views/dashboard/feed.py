@@ -61,11 +61,13 @@ class Feed:
     def turn(self) -> None:
         """Send what has come since the last turn."""
         notes: dict[str, list[dict[str, Any]]] = {"cycles": [], "events": []}
+        read_all = False
         try:
             client = self._connected()
             for _ in range(_MOST_AT_ONCE):
                 records = client.receive(0.0) if client is not None else []
                 if not records:
+                    read_all = True
                     break
                 for record in records:
                     self._sort(record, notes)
@@ -83,7 +85,7 @@ class Feed:
                 self.history.add_note(kind, note)
         if notes["cycles"] or notes["events"]:
             self._send({"notes": notes})
-        if time.monotonic() - self._heard_s > SILENT_S:
+        if read_all and time.monotonic() - self._heard_s > SILENT_S:
             if self._client is not None:
                 self._doubt(
                     f"{self._client.endpoint}: no daemon answers{self._client.doubt or '; start `hapticd run`'}"

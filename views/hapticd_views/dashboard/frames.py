@@ -102,9 +102,12 @@ def _frame(ticks: list[Tick], axes: int) -> bytes:
 
 
 def _tick(parts: list[Part | None]) -> Tick | None:
-    """A tick from its parts; None when it is not known where the device was."""
+    """A tick from its parts; None when it is not known where the device was, and what pushed it."""
     position, energy, damping, timing = parts
     if not isinstance(position, Position):
+        return None
+    axes = len(position.position_m)
+    if {len(position.force_n), len(position.force_requested_n)} != {axes}:
         return None
     values = (
         *position.position_m,
@@ -114,7 +117,7 @@ def _tick(parts: list[Part | None]) -> Tick | None:
         *(_damped(damping) if isinstance(damping, Damping) else _DAMPING),
         *((timing.late_us, timing.busy_us) if isinstance(timing, Timing) else _TIMING),
     )
-    return Tick(position.timestamp, position.seq, len(position.position_m), values)
+    return Tick(position.timestamp, position.seq, axes, values)
 
 
 def _damped(damping: Damping) -> Iterator[float]:

@@ -52,7 +52,9 @@ _ADAPTER: TypeAdapter[PageRequest] = TypeAdapter(PageRequest)
 def request(text: str | bytes) -> PageRequest | None:
     """A page's message; None when it is not what a page of ours sends."""
     try:
-        return _ADAPTER.validate_python(json.loads(text, parse_constant=_refuse))
+        data = json.loads(text, parse_constant=_refuse)
+        json.dumps(data, ensure_ascii=False).encode()  # half a character, as "\\ud800", is a text that no file takes
+        return _ADAPTER.validate_python(data)
     except (ValidationError, ValueError, RecursionError):
         return None
 

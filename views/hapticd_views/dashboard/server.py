@@ -154,6 +154,8 @@ class Dashboard:
             said = await asyncio.get_running_loop().run_in_executor(self._threads[_thread(asked)], self._do, asked)
         except HapticdError as error:
             said = {"ok": False, "text": str(error)}
+        except Exception as error:  # noqa: BLE001 - a page that gets no answer would wait for ever
+            said = {"ok": False, "text": f"defect: {type(error).__name__}: {error}"}
         viewer.answer({"answer": asked.id, **said})
 
     def _do(self, asked: Command | FormRequest | Edit) -> dict[str, Any]:
