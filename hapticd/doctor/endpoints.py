@@ -50,14 +50,20 @@ def running(directory: Path, root: Path = ROOT) -> int:
     return int(said) if said.isdecimal() else max(1, int(holder[1]))
 
 
-def instance(name: str, process: int) -> Finding:
-    """Whether the instance runs.
+def instance(name: str, processes: Mapping[Path, int]) -> Finding:
+    """Whether the instance runs, and whether it is the only one of its name.
 
     Args:
         name: of the instance.
-        process: which runs it, 0 when none does.
+        processes: which run it, by their runtime directories: the system's, and this user's own.
     """
-    return ok(f"{name!r} runs, process {process}" if process else f"{name!r} does not run")
+    if len(processes) > 1:
+        each = " and ".join(f"process {process} in {directory}" for directory, process in processes.items())
+        return advice(
+            f"two daemons run as {name!r}, {each}: commands must say which",
+            f"# --instance system/{name} or --instance user/{name}",
+        )
+    return ok(f"{name!r} runs, process {next(iter(processes.values()))}" if processes else f"{name!r} does not run")
 
 
 def runtime(directory: Path) -> Finding:

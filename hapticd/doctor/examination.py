@@ -69,7 +69,7 @@ class Examination:
             ),
             Check("rules.installed", "udev rule", lambda: rules.installed(name, root)),
             Check("configuration.usable", "config", lambda: configuration.usable(self.wanted)),
-            Check("endpoints.instance", "instance", lambda: endpoints.instance(self.instance, daemon())),
+            Check("endpoints.instance", "instance", lambda: endpoints.instance(self.instance, self._daemons())),
             Check("endpoints.runtime", "directory", lambda: endpoints.runtime(directory)),
             Check("endpoints.tcp", "endpoint", lambda: endpoints.tcp(self.wanted.tcp, _or_none(daemon))),
             Check("endpoints.keys", "keys", lambda: endpoints.keys(self.wanted.tcp, KeyDirectory(key_directory()))),
@@ -100,8 +100,13 @@ class Examination:
 
     def _daemon(self) -> int:
         """Process of the daemon that a command would reach, the system's or this user's own; 0 when there is none."""
-        found = (endpoints.running(directory, self.root) for directory in instance_directories(self.instance))
-        return next(filter(None, found), 0)
+        return next(iter(self._daemons().values()), 0)
+
+    def _daemons(self) -> dict[Path, int]:
+        """Processes that run the instance, by their directories."""
+        places = instance_directories(self.instance)
+        found = {directory: endpoints.running(directory, self.root) for directory in places}
+        return {directory: process for directory, process in found.items() if process}
 
 
 def verdict(findings: list[Finding]) -> Mark:

@@ -7,6 +7,8 @@ import os
 import shutil
 import socket
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +17,8 @@ import pytest
 
 from hapticd.doctor import configuration, endpoints
 from hapticd.doctor.configuration import Wanted
-from hapticd.doctor.finding import Check, examine
+from hapticd.doctor.examination import Examination
+from hapticd.doctor.finding import Check, Finding, examine
 from hapticd.keys.file import new_pair
 from hapticd.keys.store import KeyDirectory
 from hapticd.paths import directory
@@ -37,10 +40,11 @@ def test_a_running_daemon_is_seen_without_touching_its_lock(runtime: Path) -> No
     lock = InstanceLock("default")
     try:
         assert endpoints.running(runtime) == os.getpid()
-        says(endpoints.instance("default", endpoints.running(runtime)), "ok", f"process {os.getpid()}")
+        says(endpoints.instance("default", {runtime: endpoints.running(runtime)}), "ok", f"process {os.getpid()}")
     finally:
         lock.close()
-    says(endpoints.instance("default", endpoints.running(runtime)), "ok", "does not run")
+    assert endpoints.running(runtime) == 0
+    says(endpoints.instance("default", {}), "ok", "does not run")
 
 
 def test_a_lock_file_that_a_killed_daemon_left_is_no_daemon(runtime: Path) -> None:
@@ -60,8 +64,61 @@ def test_a_reader_of_the_lock_is_no_daemon(runtime: Path) -> None:
 def test_without_the_kernels_list_of_locks_nobody_can_tell(runtime: Path, tmp_path: Path) -> None:
     runtime.mkdir(parents=True)
     (runtime / "lock").touch()
-    look = Check("a.check", "check", lambda: endpoints.instance("default", endpoints.running(runtime, tmp_path)))
+    look = Check(
+        "a.check", "check", lambda: endpoints.instance("default", {runtime: endpoints.running(runtime, tmp_path)})
+    )
     says(examine(look), "unknown", "proc/locks")
+
+
+@contextmanager
+def living(directory: Path) -> Iterator[None]:
+    """A lock that is held, as a daemon holds it."""
+    directory.mkdir(parents=True, exist_ok=True)
+    with (directory / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        lock.write(f"{os.getpid()}\n")
+        lock.flush()
+        yield
+
+
+@pytest.fixture
+def two_places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
+    """Runtime directories of the system's daemon and of the user's own."""
+    monkeypatch.setattr("hapticd.paths._RUN", tmp_path / "system")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "user"))
+    monkeypatch.delenv("HAPTICD_RUNTIME_DIR", raising=False)
+    return tmp_path / "system/default", tmp_path / "user/hapticd/default"
+
+
+def instance_finding() -> Finding:
+    (check,) = (
+        check
+        for check in Examination(Wanted.of(directory("config") / "hapticd.toml"), "default").checks()
+        if check.name == "endpoints.instance"
+    )
+    return examine(check)[0]
+
+
+@pytest.mark.parametrize("lives", [0, 1])
+def test_neither_daemon_shadows_the_other_also_when_that_one_was_killed(
+    two_places: tuple[Path, Path], lives: int
+) -> None:
+    """S6: the doctor looked at the user's own directory only, and said of the system's daemon that it did not run."""
+    dead = two_places[1 - lives]
+    dead.mkdir(parents=True)
+    (dead / "lock").write_text("4711\n")
+    says(instance_finding(), "ok", "'default' does not run")
+    with living(two_places[lives]):
+        says(instance_finding(), "ok", f"'default' runs, process {os.getpid()}")
+
+
+def test_two_daemons_of_one_name_are_both_named_with_what_tells_them_apart(two_places: tuple[Path, Path]) -> None:
+    system, user = two_places
+    with living(system), living(user):
+        finding = says(
+            instance_finding(), "advice", f"process {os.getpid()} in {system} and process {os.getpid()} in {user}"
+        )
+    assert finding.mend == ("# --instance system/default or --instance user/default",)
 
 
 # -- its directory
