@@ -10,11 +10,12 @@ import pytest
 
 from hapticd import plugins
 from hapticd.config.models import WallConfig
+from hapticd.offline.felt import JUST_FELT, WINDOW_S
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import aimed, judge
 from hapticd.simulation.batch import Batch, BatchResult, Point
 from hapticd.simulation.options import SimulationOptions
-from hapticd_studies.felt import JUST_FELT, WINDOW_S, felt_ends
+from hapticd_studies.felt_ends import felt_ends
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.robustness.report import report
 from hapticd_studies.robustness.sweep import COLUMNS, RobustnessPlan

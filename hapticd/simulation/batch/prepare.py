@@ -26,7 +26,7 @@ class Prepared:
         duration_s: float,
         window_s: float,
         trace_every: int,
-        trace_last_s: float,
+        trace_last_s: float = math.inf,
     ) -> None:
         device, period_s = point.device, point.period_s
         changes = epochs(device, period_s)

@@ -10,9 +10,9 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
+from hapticd.offline.felt import JUST_FELT
 from hapticd.offline.outcome import Outcome
 from hapticd.version import __version__
-from hapticd_studies.felt import JUST_FELT
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.robustness.devices import DRAWN, DURATION_S, WITHIN_REACH, Device
 from hapticd_studies.robustness.readings import PAPER, short

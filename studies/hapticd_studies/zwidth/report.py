@@ -11,10 +11,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from hapticd.config.loading import parse
+from hapticd.offline.felt import JUST_FELT
 from hapticd.offline.outcome import PRESSED, Outcome
 from hapticd.version import __version__
 from hapticd_studies.boundaries import BOUNDARIES
-from hapticd_studies.felt import JUST_FELT
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.zwidth.curves import Curve, curves, limits
 from hapticd_studies.zwidth.scenario import scenario_of

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from hapticd.config.loading import parse
+from hapticd.offline.felt import WINDOW_S
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import balance_m, judge, misplaced_m
 from hapticd.simulation.batch import Batch, Point
-from hapticd_studies.felt import WINDOW_S, felt_ends
+from hapticd_studies.felt_ends import felt_ends
 from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
 from hapticd_studies.law_spec import LawSpec
