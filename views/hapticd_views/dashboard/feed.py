@@ -18,7 +18,7 @@ FRAMES_HZ = 30
 """How often the page gets what is new [Hz]."""
 
 SILENT_S = 2.5
-"""After how long without a status a daemon counts as silent, and is looked for anew [s]."""
+"""After how long without a status a daemon counts as silent, and is looked for elsewhere [s]."""
 
 _AGAIN_S = 1.0  # before a connection that was given up is tried again
 _MOST_AT_ONCE = 400  # messages; viewers and commands have their turn in between
@@ -61,13 +61,12 @@ class Feed:
     def turn(self) -> None:
         """Send what has come since the last turn."""
         notes: dict[str, list[dict[str, Any]]] = {"cycles": [], "events": []}
-        read_all = False
         try:
             client = self._connected()
             for _ in range(_MOST_AT_ONCE):
                 records = client.receive(0.0) if client is not None else []
                 if not records:
-                    read_all = True
+                    self._look_for_it()
                     break
                 for record in records:
                     self._sort(record, notes)
@@ -85,12 +84,6 @@ class Feed:
                 self.history.add_note(kind, note)
         if notes["cycles"] or notes["events"]:
             self._send({"notes": notes})
-        if read_all and time.monotonic() - self._heard_s > SILENT_S:
-            if self._client is not None:
-                self._doubt(
-                    f"{self._client.endpoint}: no daemon answers{self._client.doubt or '; start `hapticd run`'}"
-                )
-            self._leave()
 
     def _connected(self) -> Client | None:
         """The subscription, made when there is none; None while it is too early to try again."""
@@ -98,6 +91,18 @@ class Feed:
             self._again_s = time.monotonic() + _AGAIN_S
             self._client = self._target.subscribe()
         return self._client
+
+    def _look_for_it(self) -> None:
+        """All is read: say so when the daemon is silent, and go where it is now.
+
+        One that is where it was keeps its connection: it may have been starved, and what it has to say still comes.
+        """
+        if time.monotonic() - self._heard_s <= SILENT_S or self._client is None:
+            return
+        self._heard_s = time.monotonic()
+        self._doubt(f"{self._client.endpoint}: no daemon answers{self._client.doubt or '; start `hapticd run`'}")
+        if self._target.endpoint != self._client.endpoint:
+            self._leave()
 
     def _sort(self, record: Record, notes: dict[str, list[dict[str, Any]]]) -> None:
         match record:

@@ -8,7 +8,7 @@ from pathlib import Path
 from hapticd.client import Client
 from hapticd.client.commands import command
 from hapticd.errors import ClientError
-from hapticd.paths import DEFAULT_INSTANCE
+from hapticd.paths import DEFAULT_INSTANCE, telemetry_endpoint
 
 _TOPICS = ("position", "energy", "damping", "timing", "cycle", "event", "status")
 
@@ -34,13 +34,22 @@ class Target:
         """Whether it runs on this computer, so that its file can be edited."""
         return self.telemetry is None
 
+    @property
+    def endpoint(self) -> str:
+        """Where it publishes, or would.
+
+        Raises:
+            ConfigError, InstanceError: as `hapticd.paths.locate`.
+        """
+        return self.telemetry or telemetry_endpoint(self.instance)
+
     def subscribe(self) -> Client:
         """A subscription to all that the page shows.
 
         Raises:
             ClientError, ConfigError, InstanceError: as `hapticd.client.Client`.
         """
-        return Client(self.telemetry, instance=self.instance, topics=_TOPICS, keys=self.keys)
+        return Client(self.endpoint, topics=_TOPICS, keys=self.keys)
 
     def ask(self, do: str) -> None:
         """Have the daemon do something, and return when it has answered.

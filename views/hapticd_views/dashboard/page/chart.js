@@ -1,7 +1,7 @@
 // One chart over time, with its heading and its figures.
 
 import uPlot from "./vendor/uPlot.esm.js";
-import { CalmRange } from "./scale.js";
+import { CalmRange, plain } from "./scale.js";
 
 const AXIS_PX = 58;
 
@@ -83,7 +83,7 @@ export class TimeChart {
     const ink = () => theme.colour("dim"), grid = { stroke: () => theme.colour("grid"), width: 1 };
     const axis = { stroke: ink, grid, ticks: { show: false }, font: "12px system-ui, sans-serif" };
     return {
-      width: 300, height: 80, padding: [8, 12, isLast ? 0 : 6, 0], legend: { show: false },
+      width: 300, height: 80, padding: [8, 18, isLast ? 0 : 6, 0], legend: { show: false },
       cursor: { sync: { key: "time", setSeries: false }, y: false, points: { show: false },
         drag: { x: true, y: false, setScale: false } },
       scales: { x: { time: false, auto: false }, y: { auto: false } },
@@ -95,7 +95,7 @@ export class TimeChart {
       series: [{}, ...this.spec.traces.map(({ colour, alpha }) => ({
         stroke: () => theme.colour(colour), width: 1.5, alpha: alpha ?? 1, spanGaps: false, points: { size: 4 } }))],
       hooks: {
-        drawClear: [(uplot) => draw(this, uplot.ctx, uplot)],
+        drawAxes: [(uplot) => draw(this, uplot.ctx, uplot)],
         setCursor: [(uplot) => onCursor(uplot.cursor.left >= 0 ? uplot.posToVal(uplot.cursor.left, "x") : null)],
         setSelect: [(uplot) => {
           const { left, width } = uplot.select;
@@ -129,8 +129,4 @@ function seconds(x, [x0, x1]) {
   const milli = x1 - x0 <= 0.5;
   const value = milli ? x * 1000 : x;
   return `${plain(value)} ${milli ? "ms" : "s"}`;
-}
-
-function plain(value) {
-  return String(Number(value.toPrecision(6))).replace("-", "−");
 }

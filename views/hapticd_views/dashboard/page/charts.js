@@ -1,4 +1,4 @@
-// The column of charts: what is in them, and what is drawn behind their curves.
+// The column of charts: what is in them, and what is drawn between their grid and their curves.
 
 import { TimeChart } from "./chart.js";
 import { decimated } from "./decimate.js";
@@ -9,7 +9,7 @@ const COLOURS = ["x", "y", "z"];
 function specs(axes) {
   const colour = (label, index) => (axes.length === 1 ? "z" : COLOURS.includes(label) ? label : COLOURS[index % 3]);
   const each = (kind, more = {}) => axes.map((label, index) => (
-    { name: kind + index, label, colour: colour(label, index), ...more }));
+    { name: kind + index, label: axes.length === 1 ? "" : label, colour: colour(label, index), ...more }));
   return [
     { title: "Position", unit: "mm", scale: 1e3, least: 0.05, digits: 3, traces: each("x") },
     { title: "Force", unit: "N", scale: 1, least: 0.2, digits: 3,

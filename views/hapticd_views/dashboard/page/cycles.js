@@ -1,7 +1,7 @@
 // The last energy cycles, a bar each: how much energy the wall made in it. Made is bad, and has the colour of it.
 
 import uPlot from "./vendor/uPlot.esm.js";
-import { CalmRange } from "./scale.js";
+import { CalmRange, plain } from "./scale.js";
 
 const MOST = 60;
 
@@ -13,10 +13,10 @@ export class CyclePlot {
     this.range = new CalmRange(0.002);
     const axis = { stroke: () => theme.colour("dim"), font: "12px system-ui, sans-serif", ticks: { show: false } };
     this.uplot = new uPlot({
-      width: 300, height: 120, padding: [8, 12, 8, 0], legend: { show: false }, cursor: { show: false },
+      width: 300, height: 120, padding: [8, 14, 8, 0], legend: { show: false }, cursor: { show: false },
       scales: { x: { time: false, auto: false, range: [-MOST, 0] }, y: { auto: false } },
       axes: [{ ...axis, show: false },
-        { ...axis, size: 58, gap: 6, space: 26, grid: { stroke: () => theme.colour("grid"), width: 1 } }],
+        { ...axis, size: 58, gap: 6, space: 26, values: (_, at) => at.map((y) => plain(y)), grid: { stroke: () => theme.colour("grid"), width: 1 } }],
       series: [{}, { paths: () => null, points: { show: false } }],
       hooks: { draw: [(uplot) => this.#drawBars(uplot)] },
     }, [[], []], parent);

@@ -43,3 +43,8 @@ function rounded(low, high, least) {
   if (high <= 0 && top > 0) { top = 0.06 * (top - bottom); }
   return [Math.min(bottom, low), Math.max(top, high)];
 }
+
+/** A number of an axis, without the dust that sums of steps leave, and with a real minus. */
+export function plain(value) {
+  return String(Number(value.toPrecision(6))).replace("-", "−");
+}

@@ -53,7 +53,8 @@ export class Settings {
   }
 
   async apply() {
-    const values = Object.fromEntries(this.fields.filter((field) => this.#isSent(field)).map((field) => [field.spec.key, field.value]));
+    const changed = this.fields.filter((field) => field.isChanged);
+    const values = Object.fromEntries(changed.map((field) => [field.spec.key, field.value]));
     this.get("apply").disabled = true;
     this.#note("Checking …");
     const answer = await this.connection.ask({ do: "edit", hash: this.form.hash, law: this.law.value, values });
@@ -75,10 +76,6 @@ export class Settings {
     }
     const others = Object.entries(problems).map(([key, problem]) => (key ? `${key}: ${problem}` : problem));
     this.#note(["Refused, nothing changed.", ...others].join(" "), true);
-  }
-
-  #isSent(field) {
-    return field.isChanged;
   }
 
   #tab(name, label) {
@@ -107,7 +104,7 @@ export class Settings {
     this.get("page-limits").replaceChildren(...this.limitFields.map(({ element }) => element));
     this.#buildLaw();
     this.#changed();
-    this.#note(this.mayCommand ? this.form.file : "Read only: open the address with the token to edit.");
+    this.#note(this.mayCommand ? this.#file() : "Read only: open the address with the token to edit.");
   }
 
   #buildLaw() {
@@ -133,7 +130,11 @@ export class Settings {
     const count = this.fields.filter((field) => field.isChanged).length + Number(this.law.value !== this.form.law);
     this.get("apply").hidden = this.get("revert").hidden = count === 0;
     this.get("apply").textContent = count === 1 ? "Apply 1 change" : `Apply ${count} changes`;
-    this.#note(this.form.file);
+    this.#note(this.#file());
+  }
+
+  #file() {
+    return this.form.file.split("/").at(-1);
   }
 
   #note(said, isBad = false) {
