@@ -3,6 +3,7 @@
 import { TimeChart } from "./chart.js";
 import { decimated } from "./decimate.js";
 
+const MARKED = 111; // the event of `hapticd mark`
 const COLOURS = ["x", "y", "z"];
 
 /** What the charts show of a device with these axes, such as ["z"]. */
@@ -87,6 +88,9 @@ export class Charts {
     context.clip();
     this.#drawContact(context, uplot);
     for (const { t } of this.store.gaps) this.#line(context, uplot, t - this.origin, "warn");
+    for (const { code, timestamp } of this.store.events) {
+      if (code === MARKED) this.#line(context, uplot, timestamp - this.origin, "dim");
+    }
     if (this.view.isTriggered) this.#line(context, uplot, 0, "ink");
     if (chart.spec.title === "Position") this.#drawWalls(context, uplot);
     if (chart.spec.title === "Energy") this.#drawCycles(context, uplot, chart.spec.scale);
