@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
 import importlib.util
 import secrets
 from contextlib import suppress
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from hapticd.cli.remote import Instance, Keys
 from hapticd.errors import ClientError
 from hapticd.paths import DEFAULT_INSTANCE
 
@@ -19,7 +18,7 @@ PORT = 9874
 
 
 def dashboard(
-    instance: Instance = DEFAULT_INSTANCE,
+    instance: Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.")] = DEFAULT_INSTANCE,
     port: Annotated[int, typer.Option("--port", min=1, max=65535, help="TCP port of the page.")] = PORT,
     host: Annotated[
         str,
@@ -37,7 +36,10 @@ def dashboard(
     control: Annotated[
         str | None, typer.Option("--control", metavar="ENDPOINT", help="Its control.tcp; without it, watch only.")
     ] = None,
-    keys: Keys = None,
+    keys: Annotated[
+        Path | None,
+        typer.Option("--keys", metavar="FILE", help="Your key file for an endpoint; $HAPTICD_KEYS when not given."),
+    ] = None,
 ) -> None:
     """Show a running daemon in the browser, with arm, disarm and its settings.
 
@@ -50,6 +52,8 @@ def dashboard(
         raise ClientError("hapticd dashboard needs its extra: pip install 'hapticd[dashboard]'")
     if control is not None and connect is None:
         raise ClientError(f"--control {control}: name the same daemon's telemetry with --connect as well")
+    import asyncio
+
     from hapticd_views.dashboard.address import Address
     from hapticd_views.dashboard.server import Dashboard
     from hapticd_views.dashboard.target import Target
