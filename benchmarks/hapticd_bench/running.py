@@ -59,6 +59,33 @@ class RunningDaemon:
         if done.returncode:
             raise self.failed(f"`hapticd {' '.join(arguments)}` was refused: {done.stderr.strip()}")
 
+    @contextmanager
+    def started(self, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+        """`hapticd ARGUMENTS` beside it, for as long as the block lasts."""
+        with subprocess.Popen(
+            [sys.executable, "-P", "-m", "hapticd", *arguments],
+            env=self._environment | {"PYTHONUNBUFFERED": "1"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            try:
+                yield process
+            finally:
+                process.kill()
+
+    def control_pid(self) -> int:
+        """The process that runs its loop.
+
+        Raises:
+            HapticdError: there is none.
+        """
+        supervisor = self.process.pid
+        for child in Path(f"/proc/{supervisor}/task/{supervisor}/children").read_text().split():
+            if b"hapticd.loop.process" in Path(f"/proc/{child}/cmdline").read_bytes():
+                return int(child)
+        raise HapticdError("the daemon has no control process")
+
     def failed(self, how: str) -> HapticdError:
         """An error that ends with what the daemon said."""
         return HapticdError(f"{how}; the daemon said:\n{self._log.read_text().rstrip()}")

@@ -184,14 +184,14 @@ def _looks(
             interval.late_us.append(record.late_us)
             if record.deadline_ns >= look_ns:
                 end_s = (record.deadline_ns - first_ns) * 1e-9
-                yield _look(end_s, interval, daemon.process.pid)
+                yield _look(end_s, interval, daemon)
                 interval = _Interval()
                 look_ns += int(interval_s * 1e9)
                 if end_s >= duration_s:
                     return
 
 
-def _look(end_s: float, interval: _Interval, supervisor: int) -> Look:
+def _look(end_s: float, interval: _Interval, daemon: RunningDaemon) -> Look:
     return Look(
         end_s=end_s,
         ticks=interval.ticks,
@@ -199,21 +199,9 @@ def _look(end_s: float, interval: _Interval, supervisor: int) -> Look:
         skipped=interval.skipped,
         off_beat=interval.off_beat,
         late_us=Quantiles.of(interval.late_us),
-        supervisor=Process.of(supervisor),
-        control=Process.of(_control(supervisor)),
+        supervisor=Process.of(daemon.process.pid),
+        control=Process.of(daemon.control_pid()),
     )
-
-
-def _control(supervisor: int) -> int:
-    """The process that runs the loop.
-
-    Raises:
-        HapticdError: there is none.
-    """
-    for child in Path(f"/proc/{supervisor}/task/{supervisor}/children").read_text().split():
-        if b"hapticd.loop.process" in Path(f"/proc/{child}/cmdline").read_bytes():
-            return int(child)
-    raise HapticdError("the daemon has no control process")
 
 
 def _bars(looks: tuple[Look, ...], dropped: int, faults: int) -> Iterator[Bar]:

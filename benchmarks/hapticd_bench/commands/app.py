@@ -17,6 +17,10 @@ app = lazy_group(
             f"{_COMMANDS}.telemetry:telemetry",
             "Measure what publishing costs, with 0, 1 and 16 subscribers.",
         ),
+        "viewers": (
+            f"{_COMMANDS}.viewers:viewers",
+            "Measure what recorders, a dashboard and 14 subscribers cost, and whether any misses a tick.",
+        ),
         "batch": (
             f"{_COMMANDS}.batch:batch",
             "Measure the offline simulator next to the same computation in C.",
