@@ -33,6 +33,10 @@ app = lazy_group(
             "Hold the device model against limits that others have published.",
         ),
         "scene": (f"{_COMMANDS}.scene:command", "Find the smallest model that keeps every answer of a scene."),
+        "space": (
+            f"{_COMMANDS}.space:command",
+            "Find what stiffness a device in space holds, by direction and place.",
+        ),
         "extremes": (
             f"{_COMMANDS}.extremes:command",
             "Hold the model's arithmetic against exact answers, over many decades of every parameter.",
