@@ -7,6 +7,12 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 1 is Lt]",
         "hapticd/tick/guard.py: blended: weight: float = done / state.blend_ticks if done > 0.0 else 0.0  "
         "[Gt 0 is GtE]",
+        "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 1 is Lt]",
+    ),
+    "it is set before it is read": (
+        "hapticd/tick/energy.py: EnergyLedger.__init__: self.window_minimum_j = 0.0  [0.0 is 1.0]",
+        "hapticd/tick/energy.py: EnergyLedger.__init__: def __init__  [without self.window_minimum_j = 0.0]",
+        "hapticd/tick/velocity.py: LowPass.__init__: def __init__  [without self._weight = 0.0]",
     ),
 }
 """Each as `str` of a `Slip` says it."""

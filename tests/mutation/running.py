@@ -10,11 +10,12 @@ draws a sample by a seed. What a slip is comes from `tests.simulation.mutants`, 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import multiprocessing
 import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -23,6 +24,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
+from typing import cast
+
+import pytest
 
 from tests.mutation.harmless import HARMLESS
 from tests.mutation.rooms import ROOMS, Room
@@ -34,6 +38,10 @@ COPIED = (*SOURCES, "tests", "config", "docs", "systemd", "pyproject.toml", "REA
 PARALLEL = 2
 LEAST_S = 60.0
 """Shortest time limit of a run [s]; a run that takes longer than five times that of the tree as it is has noticed."""
+
+_PRELOADED = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
+_FORKS = multiprocessing.get_context("forkserver")  # what takes long to import, and is in no tree, is imported once
+_FORKS.set_forkserver_preload(["pytest", "hypothesis", "numpy", "numba", "pydantic", "tomlkit", "msgpack", "zmq"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,22 +143,34 @@ def _copy(to: Path) -> Path:
 
 def _passes(tree: Path, room: Room, limit_s: float) -> bool:
     """Whether the room's tests pass on a tree in the time given; a run that is cut short is ended with its children."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *room.tests]
+    arguments = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-W", _PRELOADED, *room.tests]
     if room.select:
-        command += ["-k", room.select]
-    paths = os.pathsep.join(str(tree / source) for source in ("", *SOURCES[1:]))
-    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1", "CI": "false"}
-    running = subprocess.Popen(
-        command, cwd=tree, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-    try:
-        return running.wait(limit_s) == 0
-    except subprocess.TimeoutExpired:
-        return False
-    finally:
-        if running.poll() is None:
-            os.killpg(running.pid, signal.SIGKILL)
-            running.wait()
+        arguments += ["-k", room.select]
+    running = _FORKS.Process(target=_run_tests, args=(tree, arguments))
+    running.start()
+    running.join(limit_s)
+    if running.exitcode is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(cast("int", running.pid), signal.SIGKILL)
+        running.kill()
+        running.join()
+    return running.exitcode == 0
+
+
+def _run_tests(tree: Path, arguments: Sequence[str]) -> None:
+    """What a process does that was forked for it: nothing of the tree has been imported yet."""
+    os.setsid()
+    os.chdir(tree)
+    paths = [str(tree / source) for source in ("", *SOURCES[1:])]
+    sys.path[:0] = paths
+    os.environ |= {"PYTHONPATH": os.pathsep.join(paths), "PYTHONDONTWRITEBYTECODE": "1", "CI": "false"}
+    sys.dont_write_bytecode = True
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    loaded = [name for name in sys.modules if name.startswith("hapticd")]
+    assert not loaded, loaded
+    os._exit(pytest.main(list(arguments)))
 
 
 def _tell(slip: Slip, lives: bool) -> None:

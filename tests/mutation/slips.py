@@ -68,8 +68,11 @@ def slips(root: Path, file: str) -> list[Slip]:
 
 
 def _is_order_of_equals(node: ast.AST) -> bool:
-    """Whether it is a call whose arguments may be swapped."""
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("min", "max")
+    """Whether it is a call whose arguments may be swapped, or are the same."""
+    if not isinstance(node, ast.Call):
+        return False
+    named = isinstance(node.func, ast.Name) and node.func.id in ("min", "max")
+    return named or len({ast.dump(argument) for argument in node.args}) < len(node.args)
 
 
 def _numbers(node: ast.AST) -> Iterator[tuple[str, Callable[[Any], None]]]:

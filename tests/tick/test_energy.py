@@ -314,3 +314,16 @@ def test_a_cycle_that_begins_inside_the_wall_lasts_from_the_first_entry() -> Non
     assert ledger.cycle == 1
     assert ledger.cycle_duration_s == pytest.approx(5e-3)
     assert ledger.cycle_energy_j == pytest.approx(1.0)
+
+
+def test_the_debt_of_a_new_touch_counts_from_nothing() -> None:
+    """Neither what an earlier one took nor what it gave is left, also where nothing was given in between."""
+    for earlier_n in (2.0, -2.0):
+        ledger = EnergyLedger()
+        ledger.update(-0.1, earlier_n, 0.0, 0.0, True, 0.0, 1e-3)
+        for _ in range(3):
+            ledger.update(0.1, 0.0, 0.0, 0.0, False, 0.0, 1e-3)
+        assert ledger.debt_j == 0.0
+        ledger.update(-0.1, 0.0, 0.0, 0.0, True, 0.0, 1e-3)
+        ledger.update(0.1, 3.0, 0.0, 0.0, True, 0.0, 1e-3)
+        assert ledger.debt_j == pytest.approx(0.3)

@@ -122,3 +122,25 @@ def test_walls_are_in_the_same_place_when_plane_and_free_side_are() -> None:
     assert here.same_place(wall(5.0, position_m=0.01, damping_n_s_per_m=2.0))
     assert not here.same_place(wall(1000.0, position_m=0.02))
     assert not here.same_place(wall(1000.0, position_m=0.01, free_side="negative"))
+
+
+@pytest.mark.parametrize(("free_side", "outward"), [("positive", 1.0), ("negative", -1.0)])
+def test_the_free_side_is_a_direction_of_length_one(free_side: str, outward: float) -> None:
+    assert wall(free_side=free_side).outward == outward
+
+
+def test_a_wall_tells_of_a_change_at_the_tick_that_brings_it() -> None:
+    changing = wall(changes=[{"at_s": 0.002, "stiffness_n_per_m": 5.0}, {"at_s": 0.003, "damping_n_s_per_m": 1.0}])
+    assert [changing.pass_time(1.0) for _ in range(6)] == [False, False, True, True, False, False]
+    late = wall(changes=[{"at_s": 0.002, "stiffness_n_per_m": 5.0}, {"at_s": 0.003, "damping_n_s_per_m": 1.0}])
+    assert [late.pass_time(1.5) for _ in range(4)] == [False, True, True, False]
+
+
+def test_a_wall_that_is_let_go_has_neither_spring_nor_damper_nor_a_future() -> None:
+    gone = wall(1000.0, damping_n_s_per_m=3.0, changes=[{"at_s": 1.0, "stiffness_n_per_m": 5.0}])
+    gone.let_go()
+    assert gone.force(-0.002, 0.5) == 0.0
+    assert gone.stored_j(-0.002, 12.0) == 0.0
+    assert not gone.changes_left
+    gone.pass_time(2000.0)
+    assert gone.force(-0.002, 0.5) == 0.0

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import VelocityConfig
-from hapticd.tick.velocity import AdaptiveWindow, Difference, Estimator, LongDifference, LowPass, make_estimator
+from hapticd.tick.velocity import (
+    AdaptiveWindow,
+    DeviceVelocity,
+    Difference,
+    Estimator,
+    LongDifference,
+    LowPass,
+    make_estimator,
+)
 
 STEPS_S = st.lists(st.floats(1e-5, 0.5), min_size=1, max_size=200)
 ALL = [
@@ -165,3 +174,40 @@ def test_the_devices_own_velocity_is_passed_on() -> None:
     made = make_estimator(VelocityConfig(estimator="device"), 1e-5)
     made.start(0.0)
     assert made.update(9.0, 1e-3, 0.125) == 0.125
+
+
+@pytest.mark.parametrize(
+    ("keys", "kind"),
+    [
+        ({}, Difference),
+        ({"samples": 1}, Difference),
+        ({"samples": 2}, LongDifference),
+        ({"estimator": "lowpass"}, LowPass),
+        ({"estimator": "lowpass", "samples": 8}, LowPass),
+        ({"estimator": "foaw", "samples": 8}, AdaptiveWindow),
+        ({"estimator": "device", "samples": 8}, DeviceVelocity),
+    ],
+)
+def test_each_estimator_is_the_one_that_was_asked_for(keys: dict[str, Any], kind: type) -> None:
+    assert type(make_estimator(VelocityConfig.model_validate(keys), 1e-5)) is kind
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+def test_a_difference_spans_as_many_samples_as_it_was_asked_for(samples: int) -> None:
+    made = make_estimator(VelocityConfig(samples=samples), 0.0)
+    made.start(0.0)
+    for count in range(1, 10):
+        made.update(float(count * count), 1.0, 0.0)
+    assert made.update(100.0, 1.0, 0.0) == pytest.approx((100.0 - (10.0 - samples) ** 2) / samples)
+
+
+@pytest.mark.parametrize("keys", [{}, {"samples": 4}, {"estimator": "lowpass"}, {"estimator": "foaw", "samples": 4}])
+def test_who_starts_anew_stands_where_it_is_told(keys: dict[str, Any]) -> None:
+    made = make_estimator(VelocityConfig.model_validate(keys), 1e-5)
+    made.start(0.0)
+    for count in range(1, 10):
+        made.update(1e-2 * count, 1e-3, 0.0)
+    made.start(0.5)
+    assert made.update(0.5, 0.0, 0.0) == 0.0
+    assert made.update(0.5, 1e-3, 0.0) == 0.0
+    assert 0.0 < made.update(0.501, 1e-3, 0.0) <= 1.0 + 1e-9
