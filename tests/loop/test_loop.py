@@ -144,3 +144,21 @@ def test_disarming_waits_behind_no_request(run: Run, shared: SharedMemory, monke
 
     told = run("", each_tick).told
     assert told.index("disable") < 200
+
+
+@pytest.mark.parametrize(("ramp_s", "ticks"), [(0.5, 50), (0.02, 20)])
+def test_a_stop_lets_go_within_its_own_time_and_within_the_ramp(run: Run, ramp_s: float, ticks: int) -> None:
+    """What stops a daemon may not wait for a ramp of half a second."""
+    stopped_at: list[int] = []
+
+    def each_tick(loop: ControlLoop, number: int) -> None:
+        if number == 700:
+            loop.session.stop_requested = True
+            assert isinstance(loop.session.driver, Diary)
+            stopped_at.append(len(loop.session.driver.told))
+
+    told = run(f"[safety]\nramp_s = {ramp_s}\n", each_tick).told
+    after = [force_n for force_n in told[stopped_at[0] :] if isinstance(force_n, float)]
+    assert after[0] == pytest.approx(5.0)
+    assert after[-1] == 0.0
+    assert len(after) == pytest.approx(ticks, abs=2)

@@ -83,3 +83,11 @@ def test_a_home_that_was_found_puts_the_handle_where_it_stands(count: int, at_m:
     found = AxisMap(TOLD, axis(reversed=reversed_, home_m=0.005))
     found.put_home(found.home_if(count, at_m))
     assert found.position_m(count) == pytest.approx(at_m, abs=0.51 * abs(found.count_m))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_largest_force_that_a_message_holds_is_never_passed(sign: int) -> None:
+    """31 bits and a sign, whatever the rig says that it can."""
+    found = AxisMap(TOLD._replace(max_force_un=2**32 - 1), axis())
+    assert found.force_un(sign * 1e9) == sign * (2**31 - 1)
+    assert AxisMap(TOLD, axis()).force_un(sign * 1e9) == sign * 5_000_000
