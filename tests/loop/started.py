@@ -9,7 +9,7 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import DriverError
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import EventReader, SharedMemory
+from hapticd.loop.memory import SKIPPED, EventReader, SharedMemory
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.record import RecordLayout
@@ -57,6 +57,7 @@ class Started:
 
     Attributes:
         told: the events of the run, once it has ended.
+        skipped: deadlines that were missed until then.
     """
 
     def __init__(self, clock: Clock, auto_arm: bool = True) -> None:
@@ -70,6 +71,7 @@ class Started:
             self.driver, self.tick, self.shared, settings.loop, settings.safety, auto_arm, self._sleep_until
         )
         self.told: list[LoopEvent] = []
+        self.skipped = 0
         self._number = 0
         self._each_tick: Callable[[int], None] = lambda _number: None
         self._ticks = 0
@@ -80,6 +82,7 @@ class Started:
         events = EventReader(self.shared)
         self.loop.run()
         self.told = events.read()
+        self.skipped = self.shared.words[SKIPPED]
         self.shared.close()
 
     def _sleep_until(self, deadline_ns: int) -> int:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import gc
 import math
 import sys
+import threading
 from collections.abc import Callable, Iterator
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import Any
 
 import pytest
 
+from hapticd import plugins
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.device import Sample
 from hapticd.supervisor.reload import switch_request
@@ -201,3 +203,33 @@ def instructions(call: Callable[[], Any]) -> int:
     finally:
         sys.settrace(before)
     return count
+
+
+def test_while_a_law_is_imported_the_interpreter_comes_back_sooner(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside the loop, which takes it within 50 us; afterwards it is as it was."""
+    seen: list[tuple[str, float]] = []
+    load = plugins.law
+
+    def law(name: str) -> ModuleType:
+        seen.append((threading.current_thread().name, sys.getswitchinterval()))
+        return load(name)
+
+    monkeypatch.setattr(plugins, "law", law)
+    before_s = sys.getswitchinterval()
+    request = switch_request(START, configured(WALLS + "[controller]\nlaw = 'tests.simulation.awkward_law'\n"))
+    seen.clear()  # who made the request has imported it as well
+    assert bench.ask(**request) == ""
+    assert bench.tick.contacts[0].law.module.__name__ == "tests.simulation.awkward_law"
+    ((thread, interval_s),) = seen
+    assert thread == "beside-the-loop"
+    assert interval_s == pytest.approx(5e-5)
+    assert sys.getswitchinterval() == before_s
+
+
+def test_a_law_that_cannot_be_imported_is_an_answer(bench: Bench) -> None:
+    request = switch_request(START, configured(WALLS)) | {"law": "tests.no_such_law", "keep_law": False}
+    assert "tests.no_such_law" in bench.ask(**request)
+    assert bench.tick.contacts[0].law.module.__name__ == "hapticd_controllers.energy_cycle"
+    assert bench.ask(do="arm") == ""

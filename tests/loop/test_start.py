@@ -59,3 +59,17 @@ def test_an_event_before_the_first_tick_has_the_time_that_it_is(started: Started
     started.run(lambda _number: None, 3)
     assert [event.deadline_ns >= now_ns for event in started.told] == [True] * len(started.told)
     assert len(started.told) >= 2
+
+
+def test_deadlines_that_are_missed_at_once_are_told_and_once_a_second(started: Started) -> None:
+    """Ten or more of them; of the others the count tells."""
+    late_ms = {20: 9.5, 120: 10.5, 320: 14.5, 1300: 12.5, 1800: 20.5}
+
+    def each_tick(number: int) -> None:
+        started.driver.before_read = lambda: started.clock.pass_s(late_ms.get(number, 0.0) * 1e-3)
+
+    started.run(each_tick, 2000)
+    bursts = [event for event in started.told if event.code == EventCode.OVERRUN_BURST]
+    assert [event.fields["skipped"] for event in bursts] == [10, 12]
+    assert [event.text for event in bursts] == [f"{count} deadlines were missed at once" for count in (10, 12)]
+    assert started.skipped == 9 + 10 + 14 + 12 + 20
