@@ -152,6 +152,14 @@ class Board:
         """Press or release the button."""
         self._do(f"button {int(button)}")
 
+    def ttl(self, high: bool) -> None:
+        """Drive the TTL input."""
+        self._do(f"ttl {int(high)}")
+
+    def syncs(self) -> int:
+        """How often the sync output has turned since the rig was switched on."""
+        return int(self._ask("syncs"))
+
     def hang(self) -> None:
         """Send the program into a loop that never looks at the processor's own watchdog."""
         self._do("hang")

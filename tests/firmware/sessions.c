@@ -118,6 +118,10 @@ static void obey(char *line)
         check(host_rig_force(host, 0) == counts, "the motor is told something else");
         return;
     }
+    if (sscanf(whole, "syncs %" SCNu32, &number) == 1) {
+        check(host_rig_syncs(host) == number, "the sync output has turned another number of times");
+        return;
+    }
     if (host != NULL) {
         expect_silence();
     }

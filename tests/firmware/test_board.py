@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 import serial
@@ -218,6 +219,48 @@ def test_the_home_switch_is_closed_at_the_lower_end_stop_only(board: Board) -> N
         assert host.poll().buttons == 1
         board.press(False)
         assert host.poll().buttons == 0
+
+
+def test_the_ttl_input_goes_with_every_state(board: Board) -> None:
+    with Talk(board) as host:
+        host.greet()
+        for high in (False, True, True, False):
+            board.ttl(high)
+            assert host.poll().buttons == 2 * high
+        board.press(True)
+        board.ttl(True)
+        assert host.push(0.0).buttons == 3
+
+
+def test_the_sync_output_turns_once_a_tick(board: Board) -> None:
+    with Talk(board) as host:
+        host.greet()
+        host.state(messages.disable)
+        host.state(messages.enable)
+        assert board.syncs() == 0, "no tick yet"
+        for tick in range(200):
+            host.push(0.1)
+            assert board.syncs() == tick + 1
+        host.say(lambda sequence: messages.ping(sequence, 0))
+        host.raw(b"\x55" * 40 + b"\0")
+        host.say(lambda sequence: messages.force(sequence - 1, 0, [0]))  # a repeated one
+        assert board.syncs() == 200
+
+
+def test_the_sync_output_turns_when_the_position_is_taken(board: Board) -> None:
+    """Two ticks that ask for the position 300 and 700 us after they came."""
+    with Talk(board) as host:
+        host.greet()
+        host.push(0.0)
+        for wait_us in (300, 700):
+            turned = board.syncs()
+            host.say(partial(messages.poll, answer_after_us=wait_us), wait_us)
+            assert board.syncs() == turned, "its bytes take time, and from then on it waits"
+            heard = host.raw(b"", 400)
+            assert board.syncs() == turned + 1
+            (state,) = [*heard, *host.raw(b"", 600)]
+            assert isinstance(state, messages.State)
+            assert board.syncs() == turned + 1
 
 
 def test_a_reversed_motor_moves_the_handle_the_wrong_way(board: Board) -> None:

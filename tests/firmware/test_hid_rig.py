@@ -88,6 +88,36 @@ def test_buttons_and_home_switch_are_active_low(program: Path) -> None:
     assert (state.flags, state.buttons) == (messages.HOME_SWITCH_CLOSED, 1)
 
 
+def test_the_ttl_input_is_a_button_and_the_sync_output_turns_once_a_tick(program: Path) -> None:
+    said = live(
+        program,
+        report(messages.hello(1)),
+        "sync",
+        report(messages.enable(2)),
+        "sync",
+        "edge 8 1",
+        report(messages.force(3, 0, [0])),
+        "sync",
+        "edge 8 0",
+        report(messages.poll(4, 100)),
+        "sync",
+        "time 100",
+        "sync",
+        report(messages.disable(5)),
+        "sync",
+    )
+    assert [line for line in said if isinstance(line, str)] == [
+        "sync 0",
+        "sync 0",
+        "sync 1",
+        "sync 1",
+        "sync 0",
+        "sync 0",
+    ]
+    buttons = [state.buttons for state in said if isinstance(state, messages.State)]
+    assert buttons == [0, 2, 0, 0]
+
+
 @pytest.mark.parametrize("line", ["time 1", "edge 2 1", "slip", "edge 7 0", report(messages.hello(1))])
 def test_the_watchdog_is_fed_once_a_round_and_by_no_interrupt(program: Path, line: str) -> None:
     """What resets a program that hangs: 0.5 s, enabled, and neither of the requests that are made by writing 0."""

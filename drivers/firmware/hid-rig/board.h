@@ -9,6 +9,8 @@ enum {
     PIN_MOTOR_DIRECTION = 5, /* high pushes towards growing counts */
     PIN_HOME_SWITCH = 6,     /* to ground, at the lower end stop */
     PIN_BUTTON = 7,          /* to ground */
+    PIN_TTL_INPUT = 8,       /* 3.3 V at most, which is all that a Teensy 4 bears; high when nothing is connected */
+    PIN_SYNC_OUTPUT = 9,     /* 3.3 V: turns when a position is taken for a tick */
 };
 
 #define PWM_HZ 20000.0f

@@ -11,10 +11,10 @@
 static const struct rig_description DESCRIPTION = {
     .axes = 1,
     .capabilities = RIG_HAS_HOME_SWITCH,
-    .buttons = 1,
+    .buttons = 2, /* the push button, and the TTL input */
     .host_silence_ms = HOST_SILENCE_MS,
     .nominal_rate_hz = NOMINAL_RATE_HZ,
-    .firmware = {1, 0, 0},
+    .firmware = {1, 1, 0},
     .model = MODEL,
     .serial = SERIAL,
     .axis = {{COUNT_PM, MAX_FORCE_UN, LOWEST_COUNTS, HIGHEST_COUNTS}},
@@ -62,13 +62,21 @@ static int32_t position(void *board, uint8_t axis)
 static uint16_t buttons(void *board)
 {
     (void)board;
-    return !digitalReadFast(PIN_BUTTON);
+    return (uint16_t)((digitalReadFast(PIN_BUTTON) ? 0 : 1) | (digitalReadFast(PIN_TTL_INPUT) ? 2 : 0));
 }
 
 static bool home_switch(void *board)
 {
     (void)board;
     return !digitalReadFast(PIN_HOME_SWITCH);
+}
+
+static void turn_sync(void *board)
+{
+    static bool level;
+    (void)board;
+    level = !level;
+    digitalWriteFast(PIN_SYNC_OUTPUT, level);
 }
 
 static void drive(void *board, uint8_t axis, int32_t force_un)
@@ -109,7 +117,7 @@ static void send(void *board, const uint8_t *message, uint8_t length)
     usb_rawhid_send(report, 0); /* 0: a host that does not fetch its reports loses them */
 }
 
-static const struct rig_hal HAL = {now_us, position, buttons, home_switch, drive, problem, forget_problem, send};
+static const struct rig_hal HAL = {now_us, position, buttons, home_switch, turn_sync, drive, problem, forget_problem, send};
 
 static void start_pins(void)
 {
@@ -119,6 +127,8 @@ static void start_pins(void)
     analogWrite(PIN_MOTOR_PWM, 0);
     pinMode(PIN_HOME_SWITCH, INPUT_PULLUP);
     pinMode(PIN_BUTTON, INPUT_PULLUP);
+    pinMode(PIN_TTL_INPUT, INPUT_PULLUP);
+    pinMode(PIN_SYNC_OUTPUT, OUTPUT);
     pinMode(PIN_ENCODER_A, INPUT_PULLUP);
     pinMode(PIN_ENCODER_B, INPUT_PULLUP);
     delayMicroseconds(100); /* what the pull-ups need with a long cable */

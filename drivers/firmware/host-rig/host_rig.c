@@ -24,6 +24,7 @@ struct host_rig {
     int32_t force_un[RIG_AXES];
     uint16_t buttons;
     bool home_switch;
+    uint32_t syncs;
     struct rig_problem problem;
 
     struct message sent[QUEUE];
@@ -66,6 +67,11 @@ static bool home_switch(void *board)
     return ((struct host_rig *)board)->home_switch;
 }
 
+static void turn_sync(void *board)
+{
+    ((struct host_rig *)board)->syncs++;
+}
+
 static void drive(void *board, uint8_t axis, int32_t force_un)
 {
     ((struct host_rig *)board)->force_un[axis] = force_un;
@@ -93,7 +99,7 @@ static void send(void *board, const uint8_t *bytes, uint8_t length)
     memcpy(slot->bytes, bytes, length);
 }
 
-static const struct rig_hal HAL = {micros, position, buttons, home_switch, drive, problem, forget_problem, send};
+static const struct rig_hal HAL = {micros, position, buttons, home_switch, turn_sync, drive, problem, forget_problem, send};
 
 struct host_rig *host_rig_new(uint8_t axes)
 {
@@ -169,6 +175,11 @@ void host_rig_mend(struct host_rig *host)
 int32_t host_rig_force(const struct host_rig *host, uint8_t axis)
 {
     return host->force_un[axis];
+}
+
+uint32_t host_rig_syncs(const struct host_rig *host)
+{
+    return host->syncs;
 }
 
 void host_rig_write(struct host_rig *host, const uint8_t *bytes, size_t length)

@@ -36,6 +36,9 @@ void host_rig_mend(struct host_rig *host);
 /* What the motor of an axis is told [uN]. */
 int32_t host_rig_force(const struct host_rig *host, uint8_t axis);
 
+/* How often its sync output has turned. */
+uint32_t host_rig_syncs(const struct host_rig *host);
+
 /* Switch it off and on again: everything but the board's variables is forgotten. */
 void host_rig_restart(struct host_rig *host);
 

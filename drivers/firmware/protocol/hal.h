@@ -38,6 +38,7 @@ struct rig_hal {
     int32_t (*position)(void *board, uint8_t axis);                   /* [counts] */
     uint16_t (*buttons)(void *board);
     bool (*home_switch)(void *board);
+    void (*sync)(void *board); /* a position is taken for a tick: turn the sync output, where there is one */
     void (*drive)(void *board, uint8_t axis, int32_t force_un);       /* 0: the motor is without current */
     bool (*problem)(void *board, struct rig_problem *problem);        /* is there one, seen or still present? */
     void (*forget_problem)(void *board);                              /* what was seen; what is present stays */

@@ -52,10 +52,17 @@ static void answer_at_once(struct rig *rig)
     say_state(rig);
 }
 
+/* The answer to a POLL or a FORCE, of which a host sends one a tick. */
+static void answer_tick(struct rig *rig)
+{
+    rig->hal->sync(rig->board);
+    answer_at_once(rig);
+}
+
 static void answer_after(struct rig *rig, uint16_t wait_us)
 {
     if (wait_us == 0) {
-        answer_at_once(rig);
+        answer_tick(rig);
         return;
     }
     rig->answer_due = true;
@@ -232,6 +239,6 @@ void rig_work(struct rig *rig)
     look_for_problems(rig);
     look_at_watchdog(rig);
     if (rig->answer_due && now_us(rig) - rig->answer_us < 0x80000000u) {
-        answer_at_once(rig);
+        answer_tick(rig);
     }
 }

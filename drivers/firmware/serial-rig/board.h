@@ -6,6 +6,8 @@
  *   PB2                 direction: high pushes towards growing counts
  *   PD4                 home switch to ground, at the lower end stop
  *   PD5                 push button to ground
+ *   PD6                 TTL input, 5 V; high when nothing is connected
+ *   PD7                 sync output, 5 V: turns when a position is taken for a tick
  *
  * Put a pull-down resistor on PB1: the pin floats while the processor is in reset, and the motor must be off then. */
 #ifndef BOARD_H
@@ -30,6 +32,8 @@
 #define ENCODER_B PD3
 #define HOME_SWITCH PD4
 #define BUTTON PD5
+#define TTL_INPUT PD6
+#define SYNC_OUTPUT PD7
 #define MOTOR_PWM PB1
 #define MOTOR_DIRECTION PB2
 

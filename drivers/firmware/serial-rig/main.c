@@ -14,10 +14,10 @@
 static const struct rig_description DESCRIPTION = {
     .axes = 1,
     .capabilities = RIG_HAS_HOME_SWITCH,
-    .buttons = 1,
+    .buttons = 2, /* the push button, and the TTL input */
     .host_silence_ms = HOST_SILENCE_MS,
     .nominal_rate_hz = NOMINAL_RATE_HZ,
-    .firmware = {1, 0, 0},
+    .firmware = {1, 1, 0},
     .model = MODEL,
     .serial = SERIAL,
     .axis = {{COUNT_PM, MAX_FORCE_UN, LOWEST_COUNTS, HIGHEST_COUNTS}},
@@ -51,13 +51,19 @@ static int32_t position(void *board, uint8_t axis)
 static uint16_t buttons(void *board)
 {
     (void)board;
-    return !(PIND & 1 << BUTTON);
+    return (uint16_t)((PIND & 1 << BUTTON ? 0 : 1) | (PIND & 1 << TTL_INPUT ? 2 : 0));
 }
 
 static bool home_switch(void *board)
 {
     (void)board;
     return !(PIND & 1 << HOME_SWITCH);
+}
+
+static void turn_sync(void *board)
+{
+    (void)board;
+    PIND = 1 << SYNC_OUTPUT; /* writing a one there turns the pin */
 }
 
 static void drive(void *board, uint8_t axis, int32_t force_un)
@@ -100,11 +106,11 @@ static void send(void *board, const uint8_t *message, uint8_t length)
     uart_write(frame, frame_make(message, length, frame));
 }
 
-static const struct rig_hal HAL = {micros, position, buttons, home_switch, drive, problem, forget_problem, send};
+static const struct rig_hal HAL = {micros, position, buttons, home_switch, turn_sync, drive, problem, forget_problem, send};
 
-/* What is due is looked at when the line is quiet, and on a line that never is, every 64 bytes: 0.64 ms at 1 Mbaud.
+/* What is due is looked at when the line is quiet, and on a line that never is, every 32 bytes: 0.32 ms at 1 Mbaud.
  * At every byte it would cost more than the time between two. */
-enum { BYTES_AT_ONCE = 64 };
+enum { BYTES_AT_ONCE = 32 };
 
 int main(void)
 {
@@ -113,7 +119,8 @@ int main(void)
     uint8_t at_once = 0;
 
     motor_start(); /* first of all: the pins are driven low */
-    PORTD |= 1 << HOME_SWITCH | 1 << BUTTON;
+    PORTD |= 1 << HOME_SWITCH | 1 << BUTTON | 1 << TTL_INPUT;
+    DDRD |= 1 << SYNC_OUTPUT;
     clock_start();
     encoder_start();
     uart_start();

@@ -18,6 +18,7 @@ struct handle {
     bool broken_wire; /* channel B of the encoder is dead */
     double phase_error_deg; /* how much later than a quarter of a period channel B comes, below 90 either way */
     bool button;
+    bool ttl; /* level at the TTL input */
     long shown;  /* counts that the encoder's channels have shown */
     long offset; /* of the encoder's disc against the handle [counts] */
 };

@@ -120,6 +120,10 @@ static void obey(const char *command)
                handle.shown, processor_resets(processor));
         return;
     }
+    if (strcmp(word, "syncs") == 0) {
+        printf("%u\n", processor_syncs(processor));
+        return;
+    }
     if (strcmp(word, "run") == 0) {
         run(a, (unsigned long)b);
         printf("%lu\n", line_given());
@@ -144,6 +148,8 @@ static void obey(const char *command)
         handle.phase_error_deg = a;
     } else if (strcmp(word, "button") == 0) {
         handle.button = a != 0.0;
+    } else if (strcmp(word, "ttl") == 0) {
+        handle.ttl = a != 0.0;
     } else if (strcmp(word, "hang") == 0 && plugged()) {
         processor_hang(processor);
     } else if (strcmp(word, "unplug") == 0 && plugged()) {

@@ -18,10 +18,10 @@ enum {
 };
 
 /* Data addresses of what drives the motor (ATmega328P data sheet, register summary). */
-enum { DDRB = 0x24, PORTB = 0x25, TCCR1A = 0x80, TCCR1B = 0x81, ICR1L = 0x86, OCR1AL = 0x88 };
-enum { PIN_PWM = 1, PIN_DIRECTION = 2 };                              /* of port B */
-enum { PIN_A = 2, PIN_B = 3, PIN_HOME_SWITCH = 4, PIN_BUTTON = 5 };   /* of port D */
-enum { OUTSIDE = 1 << PIN_A | 1 << PIN_B | 1 << PIN_HOME_SWITCH | 1 << PIN_BUTTON };
+enum { DDRB = 0x24, PORTB = 0x25, DDRD = 0x2a, PORTD = 0x2b, TCCR1A = 0x80, TCCR1B = 0x81, ICR1L = 0x86, OCR1AL = 0x88 };
+enum { PIN_PWM = 1, PIN_DIRECTION = 2 };                /* of port B */
+enum { PIN_A = 2, PIN_B = 3, PIN_HOME_SWITCH = 4, PIN_BUTTON = 5, PIN_TTL = 6, PIN_SYNC = 7 }; /* of port D */
+enum { OUTSIDE = 1 << PIN_A | 1 << PIN_B | 1 << PIN_HOME_SWITCH | 1 << PIN_BUTTON | 1 << PIN_TTL };
 
 static const double FULL_FORCE_N = 5.0; /* at a duty of 1, as drivers/firmware/serial-rig/board.h has it */
 
@@ -36,6 +36,8 @@ struct processor {
     uint8_t said[SAID];
     unsigned said_first, said_count;
     unsigned resets;
+    unsigned syncs;
+    bool sync_level;
 };
 
 static struct processor the_processor; /* simavr's reset hook has no argument of ours */
@@ -65,7 +67,8 @@ static void show_pins(struct processor *processor)
     unsigned channels = handle_channels(processor->handle);
     bool at_lower_stop = handle_counts(processor->handle) <= -STOP_COUNTS;
     unsigned levels = (channels & 1) << PIN_A | channels >> 1 << PIN_B | (unsigned)!at_lower_stop << PIN_HOME_SWITCH |
-                      (unsigned)!processor->handle->button << PIN_BUTTON;
+                      (unsigned)!processor->handle->button << PIN_BUTTON |
+                      (unsigned)processor->handle->ttl << PIN_TTL;
     if (levels == processor->levels) {
         return;
     }
@@ -73,7 +76,7 @@ static void show_pins(struct processor *processor)
     /* What drives a pin from outside wins over the pull-up that the firmware switches on. */
     avr_ioport_external_t outside = {.name = 'D', .mask = OUTSIDE, .value = levels};
     avr_ioctl(processor->avr, AVR_IOCTL_IOPORT_SET_EXTERNAL('D'), &outside);
-    for (unsigned pin = PIN_A; pin <= PIN_BUTTON; pin++) {
+    for (unsigned pin = PIN_A; pin <= PIN_TTL; pin++) {
         avr_raise_irq(processor->port_d[pin], levels >> pin & 1);
     }
 }
@@ -138,6 +141,8 @@ void processor_switch_on(struct processor *processor)
     processor->fifo_is_full = false;
     processor->said_count = 0;
     processor->resets = 0;
+    processor->syncs = 0;
+    processor->sync_level = false;
 
     avr_ioctl(avr, AVR_IOCTL_UART_GET_FLAGS('0'), &flags);
     flags &= ~(uint32_t)(AVR_UART_FLAG_POLL_SLEEP | AVR_UART_FLAG_STDIO);
@@ -167,6 +172,15 @@ bool processor_is_on(const struct processor *processor)
     return processor->avr != NULL;
 }
 
+/* An edge counts only where the firmware really drives the pin. */
+static void look_at_sync(struct processor *processor)
+{
+    const uint8_t *data = processor->avr->data;
+    bool level = data[DDRD] >> PIN_SYNC & 1 && data[PORTD] >> PIN_SYNC & 1;
+    processor->syncs += level != processor->sync_level;
+    processor->sync_level = level;
+}
+
 double processor_run(struct processor *processor)
 {
     avr_t *avr = processor->avr;
@@ -180,6 +194,7 @@ double processor_run(struct processor *processor)
     }
     double us = (double)(avr->cycle - begin) / CYCLES_PER_US;
     processor->handle->motor_n = motor_force_n(processor);
+    look_at_sync(processor);
     handle_move(processor->handle, us * 1e-6);
     show_pins(processor);
     return us;
@@ -216,6 +231,11 @@ void processor_hang(struct processor *processor)
     avr->codeend = behind + 2;
     avr->sreg[S_I] = 0;
     avr->pc = behind;
+}
+
+unsigned processor_syncs(const struct processor *processor)
+{
+    return processor->syncs;
 }
 
 unsigned processor_resets(const struct processor *processor)

@@ -32,4 +32,7 @@ void processor_hang(struct processor *processor);
 /* How often it has reset itself since it was switched on. */
 unsigned processor_resets(const struct processor *processor);
 
+/* How often its sync output has turned since it was switched on; looked at every microsecond. */
+unsigned processor_syncs(const struct processor *processor);
+
 #endif

@@ -4,6 +4,7 @@
  *   edge PIN LEVEL    a pin changes
  *   slip              both channels of the encoder change between two interrupts
  *   time US           time passes
+ *   sync              prints the level of the sync output: `sync LEVEL`
  *   motor             prints what the motor's pins do: `motor DIRECTION DUTY`
  *   watchdog          prints how it was set, and what was written to feed it since the last line: `watchdog WCR WSR...`
  *   causes            prints the reset causes that were written back: `causes SRSR`
@@ -18,7 +19,7 @@
 #include "imxrt.h"
 #include "usb_rawhid.h"
 
-enum { PINS = 8, REPORT = 64, FEEDS = 16, CAUSES = 2 };
+enum { PINS = 10, REPORT = 64, FEEDS = 16, CAUSES = 2 };
 
 static uint32_t now_us;
 static uint8_t level[PINS] = {[6] = 1, [7] = 1};
@@ -79,6 +80,8 @@ static void obey(const char *line)
         now_us += value;
     } else if (strncmp(line, "motor", 5) == 0) {
         printf("motor %u %d\n", level[5], duty[4]);
+    } else if (strncmp(line, "sync", 4) == 0) {
+        printf("sync %u\n", level[9]);
     } else if (strncmp(line, "watchdog", 8) == 0) {
         printf("watchdog %04x", CCM_CCGR3 & 3u << 16 && WDOG1_WMCR == 0 ? WDOG1_WCR : 0);
         for (unsigned i = 0; i < feeds_before; i++) {
