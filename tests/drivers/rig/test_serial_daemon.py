@@ -199,6 +199,18 @@ def test_a_rig_is_identified_homed_enabled_and_holds_a_wall(lab: Lab) -> None:
 
 
 @on_a_board(HELD_M)
+def test_the_ttl_input_is_in_the_stream_and_the_sync_output_turns_with_the_ticks(lab: Lab) -> None:
+    with Subscriber(lab.daemon.endpoint, "hapticd/input") as subscriber:
+        before = subscriber.until("hapticd/input", buttons=0)
+        lab.board.ttl(True)
+        began = subscriber.until("hapticd/input", buttons=2)
+        lab.board.ttl(False)
+        assert before["seq"] < began["seq"] < subscriber.until("hapticd/input", buttons=0)["seq"]
+    turned = lab.board.syncs()
+    wait_until(lambda: lab.board.syncs() > turned + 100, "ticks, disarmed as well")
+
+
+@on_a_board(HELD_M)
 def test_when_the_daemon_is_stopped_the_rig_lets_go_and_takes_no_force_until_it_is_enabled_anew(lab: Lab) -> None:
     with Subscriber(lab.daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
         subscriber.until("hapticd/status")  # it is connected
