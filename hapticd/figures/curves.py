@@ -16,6 +16,7 @@ Array = npt.NDArray[np.float64]
 MOST_POINTS = 6000
 """More points of a line than this are drawn as the least and the largest of each stretch: no spike is lost."""
 
+_LARGEST = 1e15  # of any quantity in SI units; a float has room for its squares
 _LONGEST_RISE = 8  # ticks from the minimum that ends a cycle to the tick that counts it, by the widest window
 
 
@@ -31,7 +32,7 @@ class Curves:
         rest_m: where the device should rest; NaN where it is not known [m].
 
     Raises:
-        HapticdError: a column is missing or of another length, or there is no tick.
+        HapticdError: a column is missing, of another length or not finite, there is no tick, or times do not rise.
     """
 
     name: str
@@ -48,6 +49,12 @@ class Curves:
         odd = [name for name, column in self.columns.items() if len(column) != len(self.columns["t_s"])]
         if odd:
             raise HapticdError(f"{self.name}: column {odd[0]} is not as long as t_s")
+        for name in self.columns:
+            wild = np.flatnonzero(~(np.abs(self[name]) <= _LARGEST))
+            if len(wild):
+                raise HapticdError(f"{self.name}: {name} is {self[name][wild[0]]:g} in row {wild[0]}: nothing to draw")
+        if len(self["t_s"]) > 1 and not np.median(np.diff(self["t_s"])) > 0.0:
+            raise HapticdError(f"{self.name}: its times do not rise")
 
     def __contains__(self, column: str) -> bool:
         return column in self.columns

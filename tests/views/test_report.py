@@ -14,8 +14,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import hapticd
+from hapticd.errors import HapticdError
 from hapticd.figures.curves import Curves
 from hapticd.offline.outcome import Outcome
 from hapticd.offline.run import Run
@@ -27,6 +30,7 @@ from hapticd_views.report.statement import Statement, statements
 from hapticd_views.report.timeline import timeline
 from hapticd_views.source import Source, open_source
 from tests.daemon.running import HAPTICD
+from tests.examples import examples
 from tests.views.recorded import EPOCH_S, write_recording
 
 CONFIG = Path(__file__).parent.parent.parent / "config"
@@ -233,6 +237,33 @@ def test_the_page_is_its_own_receipt(tmp_path: Path, still: Run) -> None:
 def test_a_thousand_events_do_not_make_an_endless_page(tmp_path: Path, still: Run) -> None:
     many = [Event(EPOCH_S + at * 1e-3, at, 103, f"event {at}", {}) for at in range(MOST_LINES + 7)]
     assert "7 more are in the recording." in shown(recorded(tmp_path, still, more=many)).text
+
+
+numbers = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-0.01, 0.01)
+
+
+@examples(100)
+@given(
+    rows=st.lists(st.tuples(numbers, numbers, numbers, numbers), min_size=1, max_size=40),
+    step_s=st.sampled_from([1e-3, 1e-9, 0.2, 1e9]),
+)
+def test_whatever_numbers_a_file_holds_there_is_a_verdict_or_a_reason(
+    rows: list[tuple[float, ...]], step_s: float
+) -> None:
+    columns = np.array(rows).T
+    held = {"t_s": np.arange(len(rows)) * step_s, "in_contact": columns[3] < 0.0}
+    named = dict(zip(("x_m", "force_n", "energy_j", "damping_n_s_per_m"), columns, strict=True))
+    if (np.abs(columns) <= 1e15).all():
+        told = statements(Source("wild.csv", (Curves("wild.csv", {**held, **named}),), None))
+        assert json.dumps([one.numbers for one in told], allow_nan=False)
+    else:
+        with pytest.raises(HapticdError, match=r"^wild\.csv: \w+ is \S+ in row \d+: nothing to draw"):
+            Curves("wild.csv", {**held, **named})
+
+
+def test_times_that_do_not_rise_are_refused_before_anything_divides_by_them() -> None:
+    with pytest.raises(HapticdError, match="its times do not rise"):
+        Curves("still.csv", {"t_s": [1.0, 1.0, 1.0], "x_m": [0.0] * 3, "force_n": [0.0] * 3})
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.npz"])

@@ -77,6 +77,8 @@ def recorded(name: str, recording: Recording) -> Source:
     ended = sorted(cycle.timestamp for cycle in recording.cycles if cycle.contact == 0)
     if "energy_j" in columns:
         columns["cycle"] = np.searchsorted(ended, ticks["timestamp"], side="right")
+    if "damping_n_s_per_m" in columns:
+        columns["damping_n_s_per_m"] = np.nan_to_num(columns["damping_n_s_per_m"])  # of a wall that a reload took away
     stiffness = recording.receipt["wall_stiffness_n_per_m"][0]
     return Source(name, (Curves(name, columns, stiffness, _rest_m(recording)),), recording)
 

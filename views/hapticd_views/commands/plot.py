@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -27,8 +28,8 @@ def plot(
             help="run, position, force, energy, damping, stiffness, loop, lateness, or fig9 (the paper's).",
         ),
     ] = "run",
-    from_s: Annotated[float, typer.Option("--from", help="Begin here [s].")] = float("-inf"),
-    to_s: Annotated[float, typer.Option("--to", help="End here [s].")] = float("inf"),
+    from_s: Annotated[float | None, typer.Option("--from", help="Begin here [s].")] = None,
+    to_s: Annotated[float | None, typer.Option("--to", help="End here [s].")] = None,
     contact: Annotated[
         bool, typer.Option("--contact", help="Count time from each run's first contact, not from its first tick.")
     ] = False,
@@ -73,8 +74,9 @@ def plot(
     curves = [one for source in sources for one in source.curves]
     if contact:
         curves = [one.from_contact() for one in curves]
-    if (from_s, to_s) != (float("-inf"), float("inf")):
-        curves = [one.between(from_s, to_s) for one in curves]
+    if from_s is not None or to_s is not None:
+        first_s, last_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
+        curves = [one.between(first_s, last_s) for one in curves]
     alone = sources[0].name if len(sources) == 1 else ""
     save(draw(figure, curves, alone if title is None else title), output)
     typer.echo(f"{output}: {figure} of {', '.join(source.name for source in sources)}")

@@ -28,6 +28,7 @@ HAND_S = 0.05
 FELT_FROM_HZ = 16.0
 """No hand trembles faster."""
 
+_MOST_FILLED = 4.0  # times the ticks that are there; beyond that they have no period
 _FINEST_M = 1e-8  # finer than any encoder of a haptic device
 
 
@@ -132,7 +133,9 @@ class _Touch:
 
     def __init__(self, curves: Curves, touch: slice, window: int) -> None:
         time_s = curves["t_s"][touch]
-        even_s = np.arange(time_s[0], time_s[-1] + 0.5 * curves.period_s, curves.period_s)
+        even_s = time_s
+        if (time_s[-1] - time_s[0]) / curves.period_s <= _MOST_FILLED * len(time_s):
+            even_s = np.arange(time_s[0], time_s[-1] + 0.5 * curves.period_s, curves.period_s)
         self._x_m = np.interp(even_s, time_s, curves["x_m"][touch])
         self._period_s = curves.period_s
         self._window = window
