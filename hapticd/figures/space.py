@@ -84,7 +84,7 @@ def _cut(panel: Axes, solids: Sequence[Proxy], at: Points, middle: Points, half:
     for solid in solids:
         values = np.empty((_CELLS, _CELLS))
         point = [float(each) for each in at]
-        pose = solid.shapes[0].pose
+        pose = solid.pose
         for row, second in enumerate(upward.tolist()):
             for column, first in enumerate(along.tolist()):
                 point[across], point[up] = first, second

@@ -177,10 +177,18 @@ class Proxy(ProxyScalars):
         self.uz = self.normal_z = 1.0
         self._bound(first.pose)
 
+    @property
+    def pose(self) -> Pose:
+        """Where the first shape is now."""
+        return Pose(
+            (self.px, self.py, self.pz),
+            ((self.xx, self.xy, self.xz), (self.yx, self.yy, self.yz), (self.zx, self.zy, self.zz)),
+        )
+
     def move(self, pose: Pose) -> Vector:
         """Move the solid to another pose of its first shape; the way of the touched material point [m]."""
         own = (self.sx, self.sy, self.sz) if self.rough else (self.gx, self.gy, self.gz)
-        x, y, z = _pose(self).point(own)
+        x, y, z = self.pose.point(own)
         _put(self, pose)
         self._bound(pose)
         if not self.touching:  # then the trace goes on from where the device was, seen from the solid
@@ -279,14 +287,3 @@ def _put(target: Part | Proxy, pose: Pose) -> None:
         (target.yx, target.yy, target.yz),
         (target.zx, target.zy, target.zz),
     ) = pose.rotation
-
-
-def _pose(target: Proxy) -> Pose:
-    return Pose(
-        (target.px, target.py, target.pz),
-        (
-            (target.xx, target.xy, target.xz),
-            (target.yx, target.yy, target.yz),
-            (target.zx, target.zy, target.zz),
-        ),
-    )

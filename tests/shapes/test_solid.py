@@ -167,6 +167,7 @@ def test_a_solid_that_moves_with_the_hand_feels_as_one_at_rest(name: str, seed: 
             expected = minus(pose.point(touched), before.point(touched)) if moving.touching else (0.0, 0.0, 0.0)
             assert way == pytest.approx(expected, abs=1e-12)
         go(moving, pose.point(own))
+        assert moving.pose == pose
         assert moving.touching == still.touching
         assert spring(moving) == pytest.approx(pose.out(_own(home, spring(still))), abs=1e-9)
 
