@@ -93,6 +93,7 @@ class DeviceInfo:
         has_gripper, has_orientation, has_velocity: whether samples carry them.
         has_clock: samples carry the device's own time.
         has_sequence: samples carry the device's own count.
+        start_m: where a simulated device with three axes starts, in the scene [m]; empty for any other.
         notes: what the user should know while it is used, a line each, such as what slows it down and how to end that.
     """
 
@@ -112,6 +113,7 @@ class DeviceInfo:
     has_velocity: bool = False
     has_clock: bool = False
     has_sequence: bool = False
+    start_m: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
 
 

@@ -13,13 +13,16 @@ from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverStateErr
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import FARTHEST_M, SimulationOptions
 from hapticd.simulation.plant import epochs
+from hapticd.simulation.space.axes import AXES, axis_options
+from hapticd.simulation.space.device import SpatialDevice
+from hapticd.simulation.space.masses import masses
 
 MOST_CATCH_UP_S = 1.0
 """clock = "wall": a host that was stopped for longer makes up for this much [s]."""
 
 
 class SimulatedDriver(Driver[SimulationOptions]):
-    """Base of every driver of a simulated one-axis device; `loopback` is one as it stands.
+    """Base of every driver of a simulated device; `loopback` is one as it stands.
 
     With `clock = "ticks"` every read but the first advances the model by one period, with the force written
     last, so that results do not depend on the host's scheduling; device time counts the same periods.
@@ -38,17 +41,25 @@ class SimulatedDriver(Driver[SimulationOptions]):
         self._outward = 1.0
         self._period_ns = round(period_s * 1e9)
         self._now_ns = time.monotonic_ns
-        self._sample = Sample(1)
+        self._sample = Sample(options.axes)
+        self._space: SpatialDevice | None = None
+        self._by_ticks = options.clock == "ticks"
         self.make_model: Callable[[SimulationOptions, float], SimulatedDevice] = SimulatedDevice
         self._model: SimulatedDevice | None = None
         self._force_n = 0.0
+        self._forces_n = [0.0] * options.axes
         self._first = True
         self._started_ns = 0
 
     @classmethod
     def check(cls, options: SimulationOptions, period_s: float) -> None:
         """Refuse what a step of this length cannot hold."""
-        epochs(options, period_s)
+        if options.axes == 1:
+            epochs(options, period_s)
+            return
+        coupled = masses(options, period_s) is not None
+        for one in axis_options(options):
+            epochs(one, period_s, coupled)
 
     @property
     def model(self) -> SimulatedDevice:
@@ -61,44 +72,56 @@ class SimulatedDriver(Driver[SimulationOptions]):
             raise DriverStateError("the device is not open")
         return self._model
 
+    @property
+    def space(self) -> SpatialDevice | None:
+        """The device model of several axes; None for one with a single axis, or while the driver is closed."""
+        return self._space
+
     def place(self, wall_m: float, outward: int) -> None:
-        """Start relative to this wall."""
+        """Start relative to this wall, where there is one axis; several have their place in the scene."""
         self._wall_m = wall_m
         self._outward = float(outward)
 
     def _open(self) -> DeviceInfo:
+        options = self.options
         try:
-            self._model = self.make_model(self.options, self.period_s)
+            if options.axes > 1:
+                self._space = SpatialDevice(options, self.period_s)
+            else:
+                self._model = self.make_model(options, self.period_s)
         except ValueError as error:
             raise DeviceProtocolError(f"device.options.{error}") from error
         self._force_n = 0.0
+        self._forces_n = [0.0] * options.axes
         self._first = True
-        options = self.options
+        along = axis_options(options) if options.axes > 1 else [options]
         return DeviceInfo(
             model=f"{self.NAME} ({options.model} model)",
             serial="",
-            axes=("x",),
-            max_force_n=options.largest_force_n,
-            resolution_m=options.resolution_m,
-            workspace_m=((self._wall_m - FARTHEST_M, self._wall_m + FARTHEST_M),),
+            axes=AXES[: options.axes],
+            max_force_n=min([one.largest_force_n for one in along]),
+            resolution_m=max([one.resolution_m for one in along]),
+            workspace_m=((self._wall_m - FARTHEST_M, self._wall_m + FARTHEST_M),) * options.axes,
             nominal_rate_hz=1.0 / self.period_s,
-            safe_damping_n_s_per_m=_safe_damping(options, self.period_s),
+            safe_damping_n_s_per_m=min([_safe_damping(one, self.period_s) for one in along]),
             host_silence_ms=0.0,
             simulated=True,
+            start_m=tuple(self._space.measured_m) if self._space is not None and options.axes == 3 else (),
             has_clock=True,
             has_sequence=True,
         )
 
     def _enable(self) -> None:
-        self._force_n = 0.0
+        self._drop()
 
     def _read(self) -> Sample:
         device = self._model
-        assert device is not None
+        if device is None:
+            return self._read_space()
         if self._first:
             self._first = False
             self._started_ns = self._now_ns()
-        elif self.options.clock == "ticks":
+        elif self._by_ticks:
             device.advance(self._force_n)
         else:
             self._catch_up(device)
@@ -111,14 +134,37 @@ class SimulatedDriver(Driver[SimulationOptions]):
         sample.sequence = device.ticks
         return sample
 
+    def _read_space(self) -> Sample:
+        device = self._space
+        assert device is not None
+        if self._first:
+            self._first = False
+        else:
+            device.advance(self._forces_n)
+        sample = self._sample
+        for axis, x_m in enumerate(device.measured_m):
+            if not -FARTHEST_M < x_m < FARTHEST_M:
+                raise DeviceFaultError(f"the model has diverged after {device.ticks * self.period_s:g} s")
+            sample.position_m[axis] = x_m
+        sample.time_ns = device.ticks * self._period_ns
+        sample.sequence = device.ticks
+        return sample
+
     def _write(self, force_n: Sequence[float]) -> None:
+        if self._space is not None:
+            self._forces_n[:] = force_n
+            return
         self._force_n = self._outward * force_n[0]
 
     def _disable(self) -> None:
-        self._force_n = 0.0
+        self._drop()
 
     def _close(self) -> None:
-        self._model = None
+        self._model = self._space = None
+
+    def _drop(self) -> None:
+        self._force_n = 0.0
+        self._forces_n = [0.0] * self.options.axes
 
     def _catch_up(self, device: SimulatedDevice) -> None:
         due = (self._now_ns() - self._started_ns) // self._period_ns

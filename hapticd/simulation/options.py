@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from hapticd.driver import DriverOptions
 from hapticd.simulation.presets import PRESETS
+from hapticd.simulation.space_options import SpaceOptions
 
 FARTHEST_M = 1e6
 """A model that has gone this far from its wall has diverged [m]."""
@@ -225,6 +226,12 @@ class SimulationOptions(DriverOptions):
         None, description="take the cheapest integrator and terms that err by no more than this"
     )
     hand: Hand = Field(default_factory=Hand, description="who holds the device")
+    axes: Literal[1, 2, 3] = Field(
+        1, description="1: across the first wall; 2 or 3: x, y and z, counted from the origin of the scene"
+    )
+    space: SpaceOptions = Field(
+        default_factory=SpaceOptions, description="with several axes, what is not alike along each"
+    )
     changes: tuple[Change, ...] = Field((), description="new values from some time on")
 
     @property
@@ -255,6 +262,24 @@ class SimulationOptions(DriverOptions):
             raise ValueError("substeps must be 1 with the exact integrator, which needs no more")
         if self.accuracy is not None and (self.integrator != "exact" or self.clock != "ticks"):
             raise ValueError('accuracy chooses the integrator itself, and needs clock = "ticks"')
+        return self
+
+    @model_validator(mode="after")
+    def _axes_fit(self) -> SimulationOptions:
+        if self.axes == 1:
+            if self.space != SpaceOptions():
+                raise ValueError("space needs axes = 2 or 3")
+            return self
+        if self.initial_position_m or self.initial_velocity_m_per_s:
+            raise ValueError("with several axes, say where the device starts in space.position_m and velocity_m_per_s")
+        if self.hand.force != ConstantForce():
+            raise ValueError("with several axes, say what the hand does in space.hand.force")
+        if self.accuracy is not None or self.clock != "ticks":
+            raise ValueError('several axes need clock = "ticks", and no accuracy to be chosen for')
+        coupled = self.space.mass_matrix_kg is not None or self.space.linkage != "none"
+        friction = self.coulomb_n or any(self.space.coulomb_n or ()) or any(c.coulomb_n for c in self.changes)
+        if coupled and (friction or self.integrator != "exact" or self.changes):
+            raise ValueError("a mass matrix takes the exact integrator, no Coulomb friction and no changes")
         return self
 
 

@@ -63,11 +63,19 @@ def start_state(options: SimulationOptions) -> dict[str, float | int]:
         "point_at": 0,
         "noise_a": 1 + seed * 69069 % 2147483562,
         "noise_b": 1 + (seed * 1664525 + 1013904223) % 2147483398,
+        "pushed_n": 0.0,
     }
 
 
-def epochs(options: SimulationOptions, period_s: float) -> list[tuple[int, dict[str, float | int]]]:
+def epochs(
+    options: SimulationOptions, period_s: float, coupled: bool = False
+) -> list[tuple[int, dict[str, float | int]]]:
     """The parameters from each change on, as (first tick, fields of `PlantParams`); the first is tick 0.
+
+    Args:
+        options: a device with one axis.
+        period_s: time between samples [s].
+        coupled: it is an axis of a device whose axes share a mass matrix.
 
     Raises:
         ValueError: the device grows or swings too fast for the rate; names the parameter and its limit.
@@ -81,16 +89,17 @@ def epochs(options: SimulationOptions, period_s: float) -> list[tuple[int, dict[
         "hand_damping_n_s_per_m": options.hand.damping_n_s_per_m,
         "hand_stiffness_n_per_m": options.hand.stiffness_n_per_m,
     }
-    found: dict[int, dict[str, float | int]] = {0: _params(options, values, period_s)}
+    found: dict[int, dict[str, float | int]] = {0: _params(options, values, period_s, coupled)}
     for change in options.changes:
         values.update(change.values())
-        found[first_tick(change.at_s, period_s)] = _params(options, values, period_s)
+        found[first_tick(change.at_s, period_s)] = _params(options, values, period_s, coupled)
     return sorted(found.items())
 
 
-def terms(options: SimulationOptions) -> dict[str, bool]:
-    """Which switches of `step` and `hand` a device needs on."""
+def terms(options: SimulationOptions, coupled: bool = False) -> dict[str, bool]:
+    """Which switches of `step` and `hand` a device needs on, as one by itself or as one of several axes."""
     return {
+        "COUPLED": coupled,
         "DELAY": options.force_delay_samples > 0,
         "SATURATION": options.max_force_n > 0.0 or any(change.max_force_n for change in options.changes),
         "LAG": options.bandwidth_hz > 0.0,
@@ -167,7 +176,9 @@ def _hand_fields(options: SimulationOptions) -> dict[str, float | int]:
     return fields
 
 
-def _params(options: SimulationOptions, values: dict[str, float], period_s: float) -> dict[str, float | int]:
+def _params(
+    options: SimulationOptions, values: dict[str, float], period_s: float, coupled: bool
+) -> dict[str, float | int]:
     mass_kg = values["mass_kg"] + values["hand_mass_kg"]
     decay_per_s = (values["viscous_n_s_per_m"] + values["hand_damping_n_s_per_m"]) / mass_kg
     spring_n_per_m = values["hand_stiffness_n_per_m"]
@@ -198,6 +209,7 @@ def _params(options: SimulationOptions, values: dict[str, float], period_s: floa
         "stiffness_per_s2": stiffness_per_s2,
         "half_swing_s": half_swing_s,
         "coulomb_n": values["coulomb_n"],
+        "coupled": int(coupled),
         "limit_n": values["max_force_n"] or math.inf,
         "lag_keep": lag_keep,
         "lag_mean": lag_mean,

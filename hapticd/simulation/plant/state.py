@@ -18,6 +18,7 @@ class PlantState:
         line_at: where the delay line is written next.
         point_at: point of a recorded hand force that was passed last.
         noise_a, noise_b: the two parts of the noise generator.
+        pushed_n: force of actuator and hand over the period that begins, where axes share a mass matrix [N].
     """
 
     __slots__ = (
@@ -28,6 +29,7 @@ class PlantState:
         "noise_a",
         "noise_b",
         "point_at",
+        "pushed_n",
         "tick",
         "v_m_per_s",
         "x_m",
@@ -43,6 +45,7 @@ class PlantState:
     point_at: int
     noise_a: int
     noise_b: int
+    pushed_n: float
 
 
 class PlantParams:
@@ -57,6 +60,7 @@ class PlantParams:
         stiffness_per_s2: k / m [1/s^2].
         half_swing_s: longest time between two standstills under constant force [s].
         coulomb_n: Coulomb friction [N].
+        coupled: 1 where the axis shares a mass matrix with others.
         limit_n: saturation of the actuator [N].
         lag_keep: share of its distance from the command that the actuator keeps over a period.
         lag_mean: mean of that share over the period.
@@ -72,6 +76,7 @@ class PlantParams:
 
     __slots__ = (
         "coulomb_n",
+        "coupled",
         "decay_per_s",
         "delay_samples",
         "half_swing_s",
@@ -112,6 +117,7 @@ class PlantParams:
     stiffness_per_s2: float
     half_swing_s: float
     coulomb_n: float
+    coupled: int
     limit_n: float
     lag_keep: float
     lag_mean: float

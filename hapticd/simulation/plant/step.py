@@ -24,6 +24,7 @@ NOISE: bool = True
 QUANTISED: bool = True
 STEPPED: bool = True
 TIMED: bool = True
+COUPLED: bool = True
 
 
 def move(state: PlantState, params: PlantParams, buffers: Buffers, force_n: float) -> None:
@@ -47,7 +48,9 @@ def move(state: PlantState, params: PlantParams, buffers: Buffers, force_n: floa
     state.applied_n = f
     if HAND:
         f = f + hand_force(state, params, buffers)
-    if STEPPED and params.method != METHOD_EXACT:
+    if COUPLED and params.coupled == 1:
+        state.pushed_n = f  # several axes go on together: `space.coupled`
+    elif STEPPED and params.method != METHOD_EXACT:
         stepped(state, params, f)
     elif FRICTION:
         slide(state, params, f)

@@ -85,7 +85,7 @@ class SingleDevice(SimulatedDevice):
         super().__init__(options, period_s)
         for params in [self._params, *(coming for _, coming in self._coming)]:
             _to_single(params)
-        _to_single(self._state)
+        _to_single(self.state)
         self._sensor = PlantParams()
         self._sensor.resolution_m, self._sensor.noise_m = options.resolution_m, options.noise_m * math.sqrt(3.0)
         self._double = specialise(sense, terms(options))
@@ -100,12 +100,12 @@ class SingleDevice(SimulatedDevice):
     @property
     def x_m(self) -> float:
         """True position [m]."""
-        return float(self._state.x_m)
+        return float(self.state.x_m)
 
     @property
     def v_m_per_s(self) -> float:
         """True velocity [m/s]."""
-        return float(self._state.v_m_per_s)
+        return float(self.state.v_m_per_s)
 
 
 def _to_single(fields: PlantState | PlantParams) -> None:

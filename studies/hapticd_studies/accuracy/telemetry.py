@@ -13,7 +13,8 @@ import zmq
 from hapticd.config.loading import LoadedConfig
 from hapticd.device import DeviceInfo
 from hapticd.telemetry.publisher import BATCH_NS, Publisher
-from hapticd.tick.record import TickRecord, WallRecord
+from hapticd.tick.contact_record import WallRecord
+from hapticd.tick.record import TickRecord
 
 BATCHES = (1, 2, 5, 10, 20, 50)
 _TICKS = 4000
