@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from hapticd.config.objects import MAX_OBJECTS, ObjectConfig, check_names
 from hapticd.settings import Table
 
 MAX_WALLS = 8
@@ -104,9 +105,18 @@ class WallConfig(Table):
 
 
 class SceneConfig(Table):
-    """[scene]: the walls."""
+    """[scene]: walls across an axis, and objects in space."""
 
     walls: tuple[WallConfig, ...] = Field((), max_length=MAX_WALLS, description="the walls, at most eight")
+    objects: tuple[ObjectConfig, ...] = Field(
+        (), max_length=MAX_OBJECTS, description="the objects, at most 64; they need a device with three axes"
+    )
+
+    @field_validator("objects")
+    @classmethod
+    def _names_differ(cls, objects: tuple[ObjectConfig, ...]) -> tuple[ObjectConfig, ...]:
+        check_names(objects)
+        return objects
 
 
 class VelocityConfig(Table):

@@ -125,7 +125,6 @@ class ControlLoop:
         sleep_until = self._sleep_until
         read = driver.read
         write = driver.write
-        step = tick.step
         monotonic_ns = time.monotonic_ns
         thread_time_ns = time.thread_time_ns
         period_ns = self._loop.period_ns
@@ -141,7 +140,8 @@ class ControlLoop:
         area = shared.record_area
         slots = shared.slots
         size = shared.layout.size
-        pack = shared.layout.pack
+        layout = shared.layout
+        layout.serve(tick)
 
         # Deadlines are whole multiples of the period, so that an outside witness can share them.
         deadline_ns = monotonic_ns() // period_ns * period_ns + 2 * period_ns
@@ -154,7 +154,7 @@ class ControlLoop:
             try:
                 sample = read()
                 read_ns = monotonic_ns()  # a read may have taken long, and a force is held from write to write
-                force_n = step(sample, (read_ns - last_ns) * 1e-9)
+                force_n = tick.advance(sample, (read_ns - last_ns) * 1e-9)
                 if driver.state is enabled:  # the zero at the end of a release as well
                     write(force_n)
                 last_ns = read_ns
@@ -163,7 +163,7 @@ class ControlLoop:
                     session.report_fault()
                 busy_us = (monotonic_ns() - woke_ns) * 1e-3
                 written = words[RECORDS]
-                pack(
+                layout.pack(
                     area,
                     written % slots * size,
                     tick,

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 from hapticd import plugins
 from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
+from hapticd.config.objects import OBJECT
 from hapticd.driver import DriverState
 from hapticd.errors import HapticdError
 from hapticd.loop.memory import DISARM, DISARMED_SINCE
@@ -144,9 +145,14 @@ class RequestHandler:
         for wall in scene["walls"]:
             walls.append(WallConfig.model_validate(wall))
             yield
-        new_scene = SceneConfig.model_validate({**scene, "walls": walls})
+        objects = []
+        for each in scene["objects"]:
+            objects.append(OBJECT.validate_python(each))
+            yield
+        new_scene = SceneConfig.model_validate({**scene, "walls": walls, "objects": objects})
         yield
         yield from tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
+        session.shared.layout.serve(tick)
         session.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
         if not keep_law:
             session.law_count += 1

@@ -6,6 +6,8 @@ import gc
 import math
 
 from hapticd.device import Sample
+from hapticd.tick.space.solid_contact import SolidContact
+from hapticd.tick.space.tick import SpaceTick
 from hapticd.tick.tick import ControlTick
 
 TICKS = 200
@@ -19,7 +21,7 @@ _SHARE_OF_LIMIT = 0.1
 
 
 def warm_up(tick: ControlTick) -> None:
-    """Press and release the walls of a tick that is made for this, as a hand would, a period a tick.
+    """Press and release walls or the first object of a tick made for this, as a hand would, a period a tick.
 
     Args:
         tick: fresh; it is of no other use afterwards.
@@ -27,9 +29,11 @@ def warm_up(tick: ControlTick) -> None:
     sample = Sample(len(tick.info.axes))
     step_m = min(_STEP_M, _SHARE_OF_LIMIT * tick.guard.max_speed_m_per_s * tick.period_s)
     surface_m = [_middle(low_m, high_m) for low_m, high_m in tick.info.workspace_m]
-    for contact in tick.contacts:
-        low_m, high_m = tick.info.workspace_m[contact.wall.axis]
-        surface_m[contact.wall.axis] = min(max(contact.wall.position_m, low_m), high_m)
+    for wall in [contact.wall for contact in tick.contacts]:
+        low_m, high_m = tick.info.workspace_m[wall.axis]
+        surface_m[wall.axis] = min(max(wall.position_m, low_m), high_m)
+    if isinstance(tick, SpaceTick) and tick.solids:
+        surface_m = _surface_of(tick.solids[0])
     period_ns = round(tick.period_s * 1e9)
     for count in range(TICKS + 1):
         depth_m = step_m * (abs(count % (4 * _STEPS) - 2 * _STEPS) - _STEPS)
@@ -40,8 +44,17 @@ def warm_up(tick: ControlTick) -> None:
             tick.start(sample)
             tick.arm()
         else:
-            tick.step(sample, tick.period_s)
+            tick.advance(sample, tick.period_s)
     gc.collect()
+
+
+def _surface_of(contact: SolidContact) -> list[float]:
+    """A point on a solid: the nearest to its middle, where it has one [m]."""
+    at_m = contact.solid.placed[0].pose.position_m
+    contact.start(*at_m)
+    proxy = contact.solid.proxy
+    normal = (proxy.normal_x, proxy.normal_y, proxy.normal_z)
+    return [middle + contact.depth_m * along for middle, along in zip(at_m, normal, strict=True)]
 
 
 def _middle(low_m: float, high_m: float) -> float:

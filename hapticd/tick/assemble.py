@@ -9,6 +9,7 @@ from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.guard import Guard
+from hapticd.tick.space.tick import SpaceTick
 from hapticd.tick.tick import ControlTick
 
 
@@ -20,7 +21,8 @@ def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
     """
     settings = config.config
     try:
-        return ControlTick(
+        kind = SpaceTick if len(info.axes) == 3 else ControlTick
+        return kind(
             settings.scene,
             settings.velocity,
             Guard(settings.safety, info),

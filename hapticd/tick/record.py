@@ -1,47 +1,35 @@
 """What one tick records, and how a record lies in shared memory.
 
 The loop writes one record a tick; the supervisor decodes it and publishes it. A record has a fixed size (the slot of
-the ring); only the walls that the scene has are written.
+the ring); only the walls that the scene has are written, and only the objects that the device may touch.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from struct import Struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from hapticd.tick.contact_record import (
+    CODES,
+    MOST_OBJECTS,
+    OBJECT,
+    SPACE,
+    WALL,
+    SpaceRecord,
+    WallRecord,
+    contact_values,
+    object_values,
+    space_record,
+    untouched,
+    wall_record,
+)
 from hapticd.tick.flags import Flag
 
 if TYPE_CHECKING:  # clients read records without the tick that makes them
     from hapticd.device import Sample
+    from hapticd.tick.space.tick import SpaceTick
     from hapticd.tick.tick import ControlTick
-
-
-@dataclass(slots=True)
-class WallRecord:
-    """One wall in one tick.
-
-    Attributes:
-        in_contact: whether the device is inside the wall.
-        stiffness_n_per_m: stiffness of the wall in this tick [N/m].
-        damping_n_s_per_m: damping of the law [N s/m]; 0 when the law has none.
-        felt_mass_kg: mass that the law has identified [kg]; 0 while unknown.
-        cycle: number of completed cycles; the four fields below belong to the last one.
-        cycle_energy_j: energy at its end [J].
-        cycle_generated_j: energy that it generated [J], > 0 when the wall gave back more than it took.
-        cycle_damping_n_s_per_m: damping in force when it ended [N s/m].
-        cycle_duration_s: how long it took [s].
-    """
-
-    in_contact: bool
-    stiffness_n_per_m: float
-    damping_n_s_per_m: float
-    felt_mass_kg: float
-    cycle: int
-    cycle_energy_j: float
-    cycle_generated_j: float
-    cycle_damping_n_s_per_m: float
-    cycle_duration_s: float
 
 
 @dataclass(slots=True)
@@ -66,6 +54,7 @@ class TickRecord:
         generated_j: energy made by sampling and hold [J].
         orientation: rotation matrix row by row, empty without a wrist.
         walls: one an entry of scene.walls, in order.
+        space: what objects add; None in a scene without.
     """
 
     seq: int
@@ -88,20 +77,21 @@ class TickRecord:
     force_requested_n: tuple[float, ...]
     orientation: tuple[float, ...]
     walls: tuple[WallRecord, ...]
+    space: SpaceRecord | None = None
 
 
-_CODES = {"int": "q", "bool": "q", "float": "d"}
-_SCALARS = [field for field in fields(TickRecord) if field.type in _CODES]
-_HEAD = "".join(_CODES[str(field.type)] for field in _SCALARS) + "q"  # and the number of walls
-_WALL = "".join(_CODES[str(field.type)] for field in fields(WallRecord))
+_SCALARS = [field for field in fields(TickRecord) if field.type in CODES]
+_HEAD = "".join(CODES[str(field.type)] for field in _SCALARS) + "q"  # and the number of walls
+_WALLS = 256
+"""What stands where the number of walls does: that number, and this times one more than the number of objects."""
 _UNCALIBRATED = int(Flag.UNCALIBRATED)
 
 
 class RecordLayout:
     """Where the fields of a record lie, for a device with `axes` axes.
 
-    First the scalars in the order of `TickRecord` and the number of walls, then the axes, the orientation and the
-    walls.
+    First the scalars in the order of `TickRecord` and the number of walls, then the axes, the orientation, the walls,
+    and where the device has the three axes that it takes what `SpaceRecord` has.
 
     Args:
         axes: translation axes of the device.
@@ -111,6 +101,7 @@ class RecordLayout:
     Attributes:
         size: of a record, whatever it holds [bytes].
         format: of a full one, as `struct` writes it.
+        pack: records a tick: `pack_walls`, or what else its scene needs, see `serve`.
     """
 
     def __init__(self, axes: int, orientation: bool, max_walls: int) -> None:
@@ -118,16 +109,29 @@ class RecordLayout:
         self.orientation = orientation
         self.max_walls = max_walls
         doubles = "d" * (4 * axes + (9 if orientation else 0))
-        self._structs = [Struct(f"<{_HEAD}{doubles}{_WALL * walls}") for walls in range(max_walls + 1)]
+        self._structs = [Struct(f"<{_HEAD}{doubles}{WALL * walls}") for walls in range(max_walls + 1)]
         self._packs = [struct.pack_into for struct in self._structs]
-        self.size = self._structs[-1].size
-        self.format = self._structs[-1].format
+        full = self._structs[-1]
+        self._in_space: list[list[Struct]] = []
+        if axes == 3:
+            self._in_space = [
+                [Struct(f"{struct.format}{SPACE}{OBJECT * near}") for near in range(MOST_OBJECTS + 1)]
+                for struct in self._structs
+            ]
+            full = self._in_space[-1][-1]
+        self.size = full.size
+        self.format = full.format
+        self.pack = self.pack_walls
 
     def struct(self, walls: int) -> Struct:
         """How a record with this many walls is packed; it may be shorter than `size`."""
         return self._structs[walls]
 
-    def pack(
+    def serve(self, tick: ControlTick) -> None:
+        """Pack from now on what the scene of a tick has."""
+        self.pack = self.pack_space if tick.has_objects else self.pack_walls
+
+    def pack_walls(
         self,
         area: memoryview,
         at: int,
@@ -211,11 +215,69 @@ class RecordLayout:
             *walls,
         )
 
+    def pack_space(
+        self,
+        area: memoryview,
+        at: int,
+        tick: ControlTick,
+        sample: Sample,
+        seq: int,
+        deadline_ns: int,
+        late_us: float,
+        busy_us: float,
+        skipped: int,
+        law: int,
+    ) -> None:
+        """The same for a scene with objects."""
+        scene = cast("SpaceTick", tick)
+        motion = tick.motion
+        books = scene.totals()
+        totals = books.ledger
+        near = scene.awake
+        if len(near) > MOST_OBJECTS:
+            near = sorted(near, key=untouched)[:MOST_OBJECTS]
+        values: list[float] = []
+        for contact in tick.contacts:
+            values += contact_values(contact, contact.wall.stiffness_n_per_m, contact.ledger)
+        values += (scene.objects, books.moved_j, books.friction_j, books.friction_stored_j)
+        x, y, z = motion.position_m
+        shown = [each for each in near if not each.leaving]
+        for each in shown:
+            values += object_values(each, x, y, z)
+        walls = len(tick.contacts)
+        self._in_space[walls][len(shown)].pack_into(
+            area,
+            at,
+            seq,
+            deadline_ns,
+            late_us,
+            busy_us,
+            motion.dt_s,
+            skipped,
+            tick.flags if sample.calibrated else tick.flags | _UNCALIBRATED,
+            law,
+            sample.buttons,
+            sample.gripper_m,
+            totals.energy_j,
+            totals.stored_j,
+            totals.dissipated_j,
+            totals.generated_j,
+            walls + _WALLS * (len(shown) + 1),
+            *motion.position_m,
+            *motion.velocity_m_per_s,
+            *tick.force_n,
+            *tick.requested_n,
+            *(sample.orientation if self.orientation else ()),
+            *values,
+        )
+
     def unpack(self, row: bytes | memoryview) -> TickRecord:
         """Decode one record."""
         scalars = len(_SCALARS)
-        walls = int.from_bytes(row[scalars * 8 : (scalars + 1) * 8], "little")
-        values = self._structs[walls].unpack_from(row)
+        count = int.from_bytes(row[scalars * 8 : (scalars + 1) * 8], "little")
+        near, walls = divmod(count, _WALLS)
+        struct = self._in_space[walls][near - 1] if near else self._structs[walls]
+        values = struct.unpack_from(row)
         at = scalars + 1
         vectors: list[tuple[float, ...]] = []
         for length in (self.axes, self.axes, self.axes, self.axes, 9 if self.orientation else 0):
@@ -223,9 +285,7 @@ class RecordLayout:
             at += length
         wall_records = []
         for _ in range(walls):
-            wall = WallRecord(*values[at : at + len(_WALL)])
-            wall.in_contact = bool(wall.in_contact)
-            wall_records.append(wall)
-            at += len(_WALL)
-        made = (*values[:scalars], *vectors, tuple(wall_records))
+            wall_records.append(wall_record(values[at : at + len(WALL)]))
+            at += len(WALL)
+        made = (*values[:scalars], *vectors, tuple(wall_records), space_record(values[at:]) if near else None)
         return TickRecord(*made)

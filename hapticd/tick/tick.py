@@ -1,6 +1,8 @@
 """One tick, without clocks or devices: sample in, force out. The daemon and every offline run share it.
 
 positions -> velocities -> contacts -> laws -> guard -> force; then the books
+
+What may happen between two samples stands in one module, so that the order of it can be read from top to bottom.
 """
 
 from __future__ import annotations
@@ -48,6 +50,8 @@ class ControlTick:
         requested_n: what the laws asked for [N].
         fault: code of a fault raised by the last tick, 0 when there was none; the loop takes and clears it.
         fault_text: what there is to say about it.
+        advance: what a loop calls each tick: `step`, or what else a scene needs.
+        has_objects: whether the scene has objects in space.
 
     Raises:
         ConfigError: the scene or the way to find the velocity does not fit the device.
@@ -77,7 +81,7 @@ class ControlTick:
         self.past = EnergyLedger()
         self.force_n = [0.0] * axes
         self.requested_n = [0.0] * axes
-        self.fallback = False
+        self.fallback = self.has_objects = False
         self.fault = 0
         self.fault_text = ""
         self._last_fault = 0
@@ -90,6 +94,7 @@ class ControlTick:
         self._blind_gain = 0.0
         self._blind_from_n = [0.0] * axes
         self.motion.watch_speed(guard.max_speed_m_per_s < math.inf)
+        self.advance: Callable[[Sample, float], list[float]] = self.step
 
     @property
     def ramp_ticks(self) -> int:
@@ -119,9 +124,8 @@ class ControlTick:
         self._excused = not sample.calibrated
         if self._blind and sample.calibrated:
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
-        for contact in self.contacts:
-            contact.start(self.motion.position_m[contact.wall.axis])
-            contact.law.start(contact.snapshot(0.0))
+        self._stand()
+        self._start_laws([(contact, contact.law) for contact in self._under_law()])
 
     def arm(self) -> bool:
         """Let forces through; a wall that is already pressed comes in by a ramp. False while latched.
@@ -133,7 +137,7 @@ class ControlTick:
             return True
         if self.guard.latched:
             return False
-        laws = self._start_laws([(contact, self.make_law()) for contact in self.contacts])
+        laws = self._start_laws([(contact, self.make_law()) for contact in self._under_law()])
         self.guard.arm()
         self.fallback = False
         for contact, law in laws:
@@ -228,7 +232,7 @@ class ControlTick:
         """Put the damping fallback in the place of every law, and stop."""
         if not self.fallback:
             self.fallback = True
-            for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in self.contacts]):
+            for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in self._under_law()]):
                 self._take_law(contact, law)
         self.fail(code, text)
 
@@ -311,8 +315,15 @@ class ControlTick:
             self._drop_gone()
         return force_n
 
+    def _under_law(self) -> list[Contact]:
+        return self.contacts  # all that have a law of the configuration's
+
     def _move_origin(self, origin_m: list[float]) -> None:
         self.motion.move_origin(origin_m)
+        self._stand()
+
+    def _stand(self) -> None:
+        """Be where the device is now, at rest and without force."""
         for contact in self._active:
             contact.start(self.motion.position_m[contact.wall.axis])
 
@@ -371,8 +382,8 @@ class ControlTick:
     def _see_again(self) -> None:
         """Positions make sense again: stand there, at rest and without force; if armed by then, come in by a ramp."""
         self._blind = False
+        self._stand()
         for contact in self._active:
-            contact.start(self.motion.position_m[contact.wall.axis])
             self._blend(contact)
 
     def _start_laws(self, laws: list[tuple[Contact, RunningLaw]]) -> list[tuple[Contact, RunningLaw]]:

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.models import MAX_WALLS
+from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.flags import Flag
-from hapticd.tick.record import RecordLayout, TickRecord, WallRecord
+from hapticd.tick.record import RecordLayout, TickRecord
 from tests.tick.rig import Rig, wall
 
 WHOLE = st.integers(-(2**63), 2**63 - 1)
@@ -67,7 +68,8 @@ def test_every_record_fits_its_slot_and_slots_keep_words_aligned(axes: int, orie
     layout = RecordLayout(axes, orientation, MAX_WALLS)
     assert all(layout.struct(count).size <= layout.size for count in range(MAX_WALLS + 1))
     assert layout.size % 8 == 0
-    assert layout.size == 8 * (15 + 4 * axes + 9 * orientation + 9 * MAX_WALLS)
+    objects = 4 + 8 * 21 if axes == 3 else 0
+    assert layout.size == 8 * (15 + 4 * axes + 9 * orientation + 9 * MAX_WALLS + objects)
 
 
 def test_one_wall_too_many_or_a_missing_number_is_refused_and_not_written() -> None:

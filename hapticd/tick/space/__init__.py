@@ -1,0 +1,1 @@
+"""The tick with objects in space: what a scene without them never runs."""

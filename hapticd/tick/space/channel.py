@@ -1,0 +1,179 @@
+"""One direction of a solid's force under a law of its own: along its normal, or along the surface if it may stick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import Any
+
+from hapticd.law import LawSnapshot
+from hapticd.shapes.pose import Vector
+from hapticd.tick.contact import Contact, RunningLaw
+from hapticd.tick.energy import EnergyLedger
+
+LEAST_M = 1e-12
+"""A spring along the surface is never quite slack, so that a law may divide by its length [m]."""
+
+
+class Direction:
+    """What stands for the wall of a channel; its direction turns with the surface.
+
+    Attributes:
+        outward: 1.0, as forces count along the direction.
+        axis: 0: a channel knows its own velocity.
+        spring_n: the spring's part of the last force along it [N].
+    """
+
+    __slots__ = ("axis", "outward", "spring_n")
+
+    def __init__(self) -> None:
+        self.outward = 1.0
+        self.axis = 0
+        self.spring_n = 0.0
+
+
+class Channel(Contact):
+    """One direction of a solid, the law that stabilises it, and its share of what was applied.
+
+    Along the normal x is less the depth. Along the surface x is the stretch of the sticking spring, of either sign.
+
+    Args:
+        law: the law of this direction.
+        resolution_m: smallest step of the device's position [m].
+        ledger: the books of its solid.
+
+    Attributes:
+        dx, dy, dz: the direction along which its force acts, a unit vector.
+        way_m: since the last sample, along the direction of then [m].
+        held_n: the spring's part of what is applied [N].
+    """
+
+    __slots__ = ("dx", "dy", "dz", "held_n", "velocity_m_per_s", "way_m", "x_of_law_m")
+
+    def __init__(self, law: RunningLaw, resolution_m: float, ledger: EnergyLedger) -> None:
+        super().__init__(Direction(), law, resolution_m)  # type: ignore[arg-type]  # stands for a wall, see there
+        self.ledger = ledger
+        self.dx = self.dy = 0.0
+        self.dz = 1.0
+        self.velocity_m_per_s = 0.0
+        self.x_of_law_m = 0.0
+        self.way_m = self.held_n = 0.0
+
+    def rest(self) -> None:
+        """Be out of touch, at rest and without force."""
+        self.in_contact = False
+        self.blending = False
+        self.x_m = self.x_of_law_m = 0.0
+        self._moved_m = self._contact_n = self.way_m = self.held_n = 0.0
+        self.velocity_m_per_s = 0.0
+        self.force_n = self.requested_n = self.applied_n = self._applied_contact_n = 0.0
+        self.tick.applied_n = self.tick.applied_contact_n = 0.0
+
+    def snapshot(self, velocity_m_per_s: float = 0.0) -> LawSnapshot:
+        """What a law that takes over now starts from; the velocity is its own."""
+        learned_n_s_per_m = self.damping_n_s_per_m if self.law.learns_damping else 0.0
+        return LawSnapshot(
+            self.x_of_law_m, self.velocity_m_per_s, self.applied_n, self.ledger.debt_j, learned_n_s_per_m
+        )
+
+    def take_law(self, law: RunningLaw, velocity_m_per_s: float, dt_s: float) -> None:
+        """Go on with another law, already started; the caller blends. The velocity is its own."""
+        super().take_law(law, self.velocity_m_per_s, dt_s)
+        self.tick.x_m = self.x_of_law_m
+
+    def see(
+        self,
+        depth_m: float,
+        x_m: float,
+        moved_m: float,
+        velocity_m_per_s: float,
+        dt_s: float,
+        spring_n: float,
+        contact_n: float,
+    ) -> None:
+        """See a new sample.
+
+        Args:
+            depth_m: of the device in the solid; 0: out of touch [m].
+            x_m: along the channel, as the law sees it [m].
+            moved_m: the way since the last sample along the direction of then [m].
+            velocity_m_per_s: along the direction of now [m/s].
+            dt_s: time since the last sample [s].
+            spring_n: of the spring, along the direction [N].
+            contact_n: the same with the solid's own damping [N].
+        """
+        tick = self.tick
+        self.x_m = -depth_m
+        tick.x_m = self.x_of_law_m = x_m
+        tick.moved_m = self._moved_m = self.way_m = moved_m
+        tick.velocity_m_per_s = self.velocity_m_per_s = velocity_m_per_s
+        tick.dt_s = dt_s
+        tick.in_contact = self.in_contact = depth_m > 0.0
+        tick.spring_n = self.wall.spring_n = spring_n
+        tick.contact_n = self._contact_n = contact_n
+
+    def apply(self, share: float) -> None:
+        """Remember what is applied from now on.
+
+        Args:
+            share: how much of the force the guard let through, 0 to 1.
+        """
+        contact_n = self._contact_n
+        if self.blending:
+            contact_n += self.force_n - self.requested_n  # so that what is left is the law's own part
+        tick = self.tick
+        tick.applied_n = self.applied_n = share * self.force_n
+        tick.applied_contact_n = self._applied_contact_n = share * contact_n
+
+
+def lay_along(channels: Sequence[Channel]) -> None:
+    """Lay the second and third channel of a solid across the first one, its normal."""
+    normal, first, second = channels
+    nx, ny, nz = normal.dx, normal.dy, normal.dz
+    tx, ty, tz = (0.0, -nz, ny) if -0.7 < nx < 0.7 else (-nz, 0.0, nx)
+    length = sqrt(tx * tx + ty * ty + tz * tz)
+    first.dx, first.dy, first.dz = tx, ty, tz = tx / length, ty / length, tz / length
+    second.dx, second.dy, second.dz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+
+
+def slip_along(
+    channels: Sequence[Channel], proxy: Any, stiffness_n_per_m: float, velocity: Vector, way: Vector, dt_s: float
+) -> None:
+    """See a new sample along the surface; the first channel has its normal of now.
+
+    Args:
+        channels: of a solid, the normal first.
+        proxy: its proxy, which touches.
+        stiffness_n_per_m: of its spring [N/m].
+        velocity: of the device [m/s].
+        way: of the device since the last sample [m].
+        dt_s: time since then [s].
+    """
+    normal, first, second = channels
+    vx, vy, vz = velocity
+    wx, wy, wz = way
+    nx, ny, nz = normal.dx, normal.dy, normal.dz
+    first_m = first.dx * wx + first.dy * wy + first.dz * wz
+    second_m = second.dx * wx + second.dy * wy + second.dz * wz
+    # The first direction stays as far as the surface lets it; the second stands across.
+    off = first.dx * nx + first.dy * ny + first.dz * nz
+    tx = first.dx - off * nx
+    ty = first.dy - off * ny
+    tz = first.dz - off * nz
+    length = sqrt(tx * tx + ty * ty + tz * tz)
+    if length < 0.5:  # it has become the normal: take another
+        lay_along(channels)
+    else:
+        first.dx = tx = tx / length
+        first.dy = ty = ty / length
+        first.dz = tz = tz / length
+        second.dx = ny * tz - nz * ty
+        second.dy = nz * tx - nx * tz
+        second.dz = nx * ty - ny * tx
+    for channel, moved_m in ((first, first_m), (second, second_m)):
+        x_m = -(proxy.stretch_x * channel.dx + proxy.stretch_y * channel.dy + proxy.stretch_z * channel.dz)
+        if -LEAST_M < x_m < LEAST_M:
+            x_m = -LEAST_M
+        v_m_per_s = channel.dx * vx + channel.dy * vy + channel.dz * vz
+        spring_n = -stiffness_n_per_m * x_m
+        channel.see(proxy.depth_m, x_m, moved_m, v_m_per_s, dt_s, spring_n, spring_n)

@@ -1,0 +1,153 @@
+"""Solids: the objects of a scene, compiled for the tick. Objects that overlap and are alike on the surface are one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from typing import Any
+
+from hapticd.config.objects import BoxObject, CapsuleObject, CylinderObject, MeshObject, ObjectConfig, SphereObject
+from hapticd.device import DeviceInfo
+from hapticd.errors import ConfigError
+from hapticd.shapes.pose import Pose
+from hapticd.shapes.solid import Placed, Proxy, group
+
+FASTEST_M_PER_S = 5.0
+"""A device that is faster may be inside a thin object before it is looked for [m/s]."""
+
+_SURFACE = ("stiffness_n_per_m", "damping_n_s_per_m", "static_friction", "dynamic_friction")
+
+
+class Solid:
+    """One solid, ready for the tick.
+
+        F = k (s - p) - b (u . v) u        p the device, s its proxy on the surface, u the normal there
+
+    Args:
+        configs: its objects, the first of which gives it its name.
+        index: of the first object in the scene.
+        period_s: time between ticks [s].
+
+    Attributes:
+        name: who it is through a reload.
+        index: of its first object in the scene.
+        configs: what the tables say.
+        placed: the shapes at their places.
+        proxy: the point on its surface that pulls the device back; it keeps its own state.
+        stiffness_n_per_m, damping_n_s_per_m: in force now.
+        rough: whether it has friction.
+
+    Raises:
+        ConfigError: a shape that is not possible.
+    """
+
+    __slots__ = (
+        "configs",
+        "damping_n_s_per_m",
+        "index",
+        "name",
+        "placed",
+        "proxy",
+        "rough",
+        "stiffness_n_per_m",
+    )
+
+    def __init__(self, configs: Sequence[ObjectConfig], index: int, period_s: float) -> None:
+        first = configs[0]
+        self.name = first.name
+        self.index = index
+        self.configs = tuple(configs)
+        self.placed = [placed(config) for config in configs]
+        margin_m = FASTEST_M_PER_S * period_s
+        self.proxy = Proxy(self.placed, first.static_friction, first.dynamic_friction, margin_m)
+        self.stiffness_n_per_m = first.stiffness_n_per_m
+        self.damping_n_s_per_m = first.damping_n_s_per_m
+        self.rough = first.static_friction > 0.0
+
+    def stored_j(self, stretch_m: float, limit_n: float) -> float:
+        """Energy in the spring [J]: k s^2 / 2, and force times length where the guard's limit flattens it.
+
+        Args:
+            stretch_m: from the device to its proxy, >= 0 [m].
+            limit_n: largest force that the guard lets through [N].
+        """
+        spring_n = self.stiffness_n_per_m * stretch_m
+        if spring_n <= limit_n:
+            return 0.5 * spring_n * stretch_m
+        return limit_n * (stretch_m - 0.5 * limit_n / self.stiffness_n_per_m)
+
+    def same_as(self, other: Solid) -> bool:
+        """Whether the tables of the two say the same."""
+        return self.configs == other.configs
+
+    def inherit(self, other: Solid) -> bool:
+        """Take the proxy over from a solid of the same name, where this one has moved but is the same shape.
+
+        Returns:
+            Whether it was; else the proxy must be found anew.
+        """
+        if _without_place(self.configs) != _without_place(other.configs):
+            return False
+        self.proxy = copy(other.proxy)
+        if self.placed[0].pose != other.placed[0].pose:
+            self.proxy.move(self.placed[0].pose)
+        return True
+
+    def let_go(self) -> None:
+        """Be gone: without force from now on."""
+        self.stiffness_n_per_m = self.damping_n_s_per_m = 0.0
+
+
+def placed(config: ObjectConfig) -> Placed:
+    """The shape of an object at its place.
+
+    Raises:
+        ConfigError: a size or a file that is not possible.
+    """
+    keys: dict[str, Any] = {"pose": Pose.of(config.position_m, config.orientation), "inside": config.inside}
+    match config:
+        case SphereObject():
+            keys |= {"radius_m": config.radius_m}
+        case BoxObject():
+            keys |= {"size_m": config.size_m, "rounding_m": config.rounding_m}
+        case CapsuleObject():
+            keys |= {"radius_m": config.radius_m, "length_m": config.length_m}
+        case CylinderObject():
+            keys |= {"radius_m": config.radius_m, "length_m": config.length_m, "rounding_m": config.rounding_m}
+        case MeshObject():
+            raise ConfigError(f"file = {config.file}: meshes cannot be read yet")
+        case _:
+            pass
+    return Placed(config.shape, **keys)
+
+
+def compile_objects(objects: Sequence[ObjectConfig], info: DeviceInfo, period_s: float) -> list[Solid]:
+    """The solids of a scene on a device, in the order of their first objects.
+
+    Raises:
+        ConfigError: objects on a device with fewer than three axes, or a shape that is not possible.
+    """
+    if objects and len(info.axes) < 3:
+        raise ConfigError(
+            f'scene.objects[0] "{objects[0].name}": objects need three axes, and {info.model} has {len(info.axes)}'
+        )
+    shapes = []
+    for index, config in enumerate(objects):
+        try:
+            shapes.append(placed(config))
+        except ConfigError as error:
+            raise ConfigError(f'scene.objects[{index}] "{config.name}": {error}') from None
+    surfaces = [tuple(getattr(config, key) for key in _SURFACE) for config in objects]
+    return [
+        Solid([objects[at] for at in members], members[0], period_s)
+        for members in sorted(group(shapes, surfaces), key=lambda members: members[0])
+    ]
+
+
+def _without_place(configs: Sequence[ObjectConfig]) -> list[dict[str, Any]]:
+    """What tables say but for the place of the first: of the others it counts, as they are seen from there."""
+    skip = ("position_m", "orientation", "stiffness_n_per_m", "damping_n_s_per_m")
+    return [
+        {key: value for key, value in config.__dict__.items() if at > 0 or key not in skip}
+        for at, config in enumerate(configs)
+    ]

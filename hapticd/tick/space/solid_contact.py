@@ -1,0 +1,384 @@
+"""One solid under its laws: the held force as a vector, its share of what was applied, its books.
+
+Energy into the solid is the work of the vector that was held, E(n) = E(n-1) - F(n-1) . (p(n) - p(n-1)), exact however
+the normal turns. Each law sees a scalar of it: the force of its direction, and the way along that same direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from math import inf, sqrt
+
+from hapticd.shapes.pose import Vector
+from hapticd.shapes.proxy import follow, place
+from hapticd.tick.contact import RunningLaw
+from hapticd.tick.energy import EnergyLedger
+from hapticd.tick.space.channel import Channel, lay_along, slip_along
+from hapticd.tick.space.solid import Solid
+
+OUTSIDE_S = 0.5
+"""How long a law that keeps time outside is asked after the touch, such as of a ring that dies away [s]."""
+
+TURNED = 0.94
+"""Cosine of the turn of the normal, 20 degrees, after which a law forgets what it found out about its direction.
+
+A mass that was felt belongs to a direction: a damper that one axis bears may shake another that is five times lighter.
+What the law has learnt to be its damping goes on, under the bound that it gives itself while it knows no mass.
+"""
+
+
+class SolidContact:
+    """One solid, the laws that stabilise it and the ledger that watches them.
+
+    Args:
+        solid: the compiled solid.
+        make_law: a fresh law, one a direction.
+        resolution_m: smallest step of the device's position [m].
+
+    Attributes:
+        channels: along the normal, and where friction can stick two along the surface.
+        ledger: the books of the whole vector.
+        quiet: out of touch, without force, and nothing left to book.
+        moved_j: work that changes of the solid itself did on its spring [J].
+        friction_j: energy that slipping took, a part of what is dissipated [J].
+        friction_stored_j: energy in the spring along the surface, a part of what is stored [J].
+        depth_m: of the device in the solid [m].
+    """
+
+    __slots__ = (
+        "_away",
+        "_moved_m",
+        "_outside_s",
+        "_spring_n",
+        "_ux",
+        "_uy",
+        "_uz",
+        "channels",
+        "depth_m",
+        "friction_j",
+        "friction_stored_j",
+        "leaving",
+        "ledger",
+        "moved_j",
+        "normal",
+        "quiet",
+        "resolution_m",
+        "solid",
+        "turned",
+    )
+
+    def __init__(self, solid: Solid, make_law: Callable[[], RunningLaw], resolution_m: float) -> None:
+        self.solid = solid
+        self.resolution_m = resolution_m
+        self.ledger = EnergyLedger()
+        self.normal = Channel(make_law(), resolution_m, self.ledger)
+        self.channels = [self.normal]
+        if solid.rough:
+            self.channels += [Channel(make_law(), resolution_m, self.ledger) for _ in range(2)]
+        self.quiet = True
+        self.leaving = False
+        self.moved_j = 0.0
+        self.friction_j = 0.0
+        self.friction_stored_j = 0.0
+        self.depth_m = 0.0
+        self._away = False
+        self._moved_m = 0.0
+        self._outside_s = 0.0
+        self.turned = False
+        self._spring_n = 0.0
+        self._ux = self._uy = 0.0
+        self._uz = 1.0
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the device is inside."""
+        return self.normal.in_contact
+
+    @property
+    def faded(self) -> bool:
+        """Whether nothing is left of its force, nor to book."""
+        return self.quiet or not any(channel.blending or channel.applied_n != 0.0 for channel in self.channels)
+
+    def start(self, x: float, y: float, z: float) -> None:
+        """Have the device at a point of the world, at rest and without force [m]."""
+        proxy = self.solid.proxy
+        place(proxy, proxy.others, proxy.voxels, x, y, z)
+        for channel in self.channels:
+            channel.rest()
+        self._stand()
+
+    def rougher(self, solid: Solid, make_law: Callable[[], RunningLaw]) -> list[Channel]:
+        """Channels along the surface that another solid in the place of this one needs, and this one has not."""
+        if not solid.rough or len(self.channels) == 3:
+            return []
+        return [Channel(make_law(), self.resolution_m, self.ledger) for _ in range(2)]
+
+    def shade(self, make_law: Callable[[], RunningLaw]) -> SolidContact:
+        """A contact that holds what this one applies and has nothing of its own: it is there to fade out."""
+        shade = SolidContact(copy(self.solid), make_law, self.resolution_m)
+        shade.solid.proxy = copy(self.solid.proxy)
+        shade.let_go(inf)
+        for of, channel in zip(self.channels, shade.channels, strict=False):
+            channel.dx, channel.dy, channel.dz = of.dx, of.dy, of.dz
+            channel.in_contact, channel.x_m, channel.applied_n = of.in_contact, of.x_m, of.applied_n
+        shade.depth_m = self.depth_m
+        shade.quiet = False
+        return shade
+
+    def change(self, solid: Solid, along: list[Channel], limit_n: float, at: Vector) -> None:
+        """Go on with another solid in the place of this one, and without force: its shade keeps that.
+
+        What the change does to the spring is the scene's own work.
+
+        Args:
+            solid: it.
+            along: channels along the surface, where it has friction and the one before had none.
+            limit_n: the guard's limit for one contact [N].
+            at: where the device is [m].
+        """
+        stays = solid.inherit(self.solid)
+        self.solid = solid
+        if not solid.rough:
+            del self.channels[1:]
+        self.channels += along
+        for channel in self.channels:
+            channel.rest()
+        proxy = solid.proxy
+        (follow if stays else place)(proxy, proxy.others, proxy.voxels, *at)
+        self._stand()
+        self._restore(limit_n)
+
+    def let_go(self, limit_n: float) -> None:
+        """Be gone: what is left of the force fades out."""
+        self.solid.let_go()
+        self._restore(limit_n)
+        self.leaving = True
+
+    def observe(
+        self,
+        at: Vector,
+        velocity: Vector,
+        way: Vector,
+        dt_s: float,
+    ) -> bool:
+        """See a new sample; False when there is nothing to do: out of touch, and all that was held has been booked.
+
+        Args:
+            at: where the device is [m].
+            velocity: of the device [m/s].
+            way: since the last sample [m].
+            dt_s: time since then [s].
+        """
+        solid = self.solid
+        proxy = solid.proxy
+        x, y, z = at
+        if self.quiet:
+            reach = proxy.reach_x * x + proxy.reach_y * y + proxy.reach_z * z
+            if reach + proxy.reach_w * (x * x + y * y + z * z) > proxy.reach_limit:
+                self._away = True
+                return False
+            if self._away:
+                self._away = False
+                place(proxy, proxy.others, proxy.voxels, x, y, z)
+        follow(proxy, proxy.others, proxy.voxels, x, y, z)
+        if not proxy.touching:
+            return not self.quiet and self._lose(velocity, way, dt_s)
+        normal = self.normal
+        self.depth_m = reach_m = proxy.depth_m
+        nx = proxy.normal_x
+        ny = proxy.normal_y
+        nz = proxy.normal_z
+        wx, wy, wz = way
+        if not normal.in_contact:  # the way to the surface counts along its normal
+            self.quiet = False
+            normal.dx = nx
+            normal.dy = ny
+            normal.dz = nz
+        self._moved_m = moved_m = normal.dx * wx + normal.dy * wy + normal.dz * wz
+        normal.dx = nx
+        normal.dy = ny
+        normal.dz = nz
+        vx, vy, vz = velocity
+        if solid.rough:
+            reach_m += nx * proxy.stretch_x + ny * proxy.stretch_y + nz * proxy.stretch_z
+            slip_along(self.channels, proxy, solid.stiffness_n_per_m, velocity, way, dt_s)
+        if nx * self._ux + ny * self._uy + nz * self._uz < TURNED:
+            self.turned = True
+        v_m_per_s = nx * vx + ny * vy + nz * vz
+        spring_n = contact_n = solid.stiffness_n_per_m * reach_m
+        if solid.damping_n_s_per_m != 0.0:
+            contact_n -= solid.damping_n_s_per_m * v_m_per_s
+        normal.see(self.depth_m, -reach_m, moved_m, v_m_per_s, dt_s, spring_n, contact_n)
+        return True
+
+    def act(self, periods: float) -> None:
+        """Ask the laws for their forces.
+
+        Args:
+            periods: time since the last tick, in periods of the loop, for a blend.
+
+        Raises:
+            BaseException: whatever a law raises.
+        """
+        if self.turned:
+            proxy = self.solid.proxy
+            self._ux, self._uy, self._uz = proxy.normal_x, proxy.normal_y, proxy.normal_z
+            self.turned = False
+            for channel in self.channels:
+                channel.law.start(channel.snapshot())
+        for channel in self.channels:
+            channel.act(periods)
+
+    def hold(self, periods: float) -> None:
+        """Stay with what the laws asked for last, at a tick without a new sample; a blend goes on."""
+        for channel in self.channels:
+            channel.hold(periods)
+
+    def add(self, force_n: list[float], requested_n: list[float]) -> None:
+        """Add what is asked for to the sums over all contacts, one element an axis [N]."""
+        for channel in self.channels:
+            newton = channel.force_n
+            dx = channel.dx
+            dy = channel.dy
+            dz = channel.dz
+            force_n[0] += dx * newton
+            force_n[1] += dy * newton
+            force_n[2] += dz * newton
+            newton = channel.requested_n
+            requested_n[0] += dx * newton
+            requested_n[1] += dy * newton
+            requested_n[2] += dz * newton
+
+    def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
+        """Enter the tick into the books and remember what is applied from now on.
+
+        Args:
+            share: how much of the force the guard let through, 0 to 1.
+            gain: how much of that a release has left, 0 to 1.
+            limit_n: the guard's limit for one contact [N].
+            dt_s: time since the last sample; 0: this is the same once more, and the books wait for the next [s].
+        """
+        solid = self.solid
+        if solid.rough:
+            self._settle_rough(share, gain, limit_n, dt_s)
+            return
+        normal = self.normal
+        depth_m = self.depth_m
+        if dt_s > 0.0:
+            self.ledger.update(
+                self._moved_m,
+                normal.applied_n,
+                self._spring_n,
+                gain * solid.stored_j(depth_m, limit_n),
+                normal.in_contact,
+                normal.damping_n_s_per_m,
+                dt_s,
+            )
+        normal.apply(share)
+        if depth_m > 0.0:
+            spring_n = solid.stiffness_n_per_m * depth_m
+            self._spring_n = gain * (spring_n if spring_n <= limit_n else limit_n)
+        else:
+            self._rest()
+
+    @property
+    def force(self) -> Vector:
+        """What was applied in the end [N]."""
+        channels = self.channels
+        return (
+            sum([channel.dx * channel.applied_n for channel in channels]),
+            sum([channel.dy * channel.applied_n for channel in channels]),
+            sum([channel.dz * channel.applied_n for channel in channels]),
+        )
+
+    def _settle_rough(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
+        """The same with friction: each channel holds its part of the vector, along its own direction."""
+        solid = self.solid
+        proxy = solid.proxy
+        normal = self.normal
+        depth_m = self.depth_m
+        stiffness_n_per_m = gain * solid.stiffness_n_per_m
+        stretch_m = self._stretch_m() if depth_m > 0.0 else 0.0
+        if dt_s > 0.0:
+            spring_j = taken_j = 0.0
+            for channel in self.channels:
+                taken_j -= channel.applied_n * channel.way_m
+                spring_j -= channel.held_n * channel.way_m
+            lost_j = stiffness_n_per_m * proxy.lost_m2
+            ledger = self.ledger
+            stored_j = gain * solid.stored_j(stretch_m, limit_n)
+            ledger.update(-1.0, taken_j, spring_j, stored_j + lost_j, normal.in_contact, normal.damping_n_s_per_m, dt_s)
+            ledger.stored_j = stored_j
+            ledger.dissipated_j += lost_j
+            self.friction_j += lost_j
+            along_m2 = proxy.stretch_x * proxy.stretch_x + proxy.stretch_y * proxy.stretch_y
+            self.friction_stored_j = 0.5 * stiffness_n_per_m * (along_m2 + proxy.stretch_z * proxy.stretch_z)
+        held = gain
+        if solid.stiffness_n_per_m * stretch_m > limit_n:
+            held *= limit_n / (solid.stiffness_n_per_m * stretch_m)
+        for channel in self.channels:
+            channel.apply(share)
+            channel.held_n = held * channel.wall.spring_n
+        if depth_m == 0.0:
+            self._rest()
+
+    def _rest(self) -> None:
+        """Be out of touch: nothing is left to do once laws that keep time have had the time that they look at."""
+        self._spring_n = 0.0
+        self.quiet = self.normal.law.rests or self._outside_s > OUTSIDE_S
+
+    def _lose(self, velocity: Vector, way: Vector, dt_s: float) -> bool:
+        """See a sample out of touch."""
+        self._outside_s = self._outside_s + dt_s if self.depth_m == 0.0 else 0.0
+        self.depth_m = 0.0
+        self.turned = False
+        free_m = self.solid.proxy.d
+        vx, vy, vz = velocity
+        wx, wy, wz = way
+        for channel in self.channels:
+            x, y, z = channel.dx, channel.dy, channel.dz
+            channel.see(0.0, free_m, x * wx + y * wy + z * wz, x * vx + y * vy + z * vz, dt_s, 0.0, 0.0)
+        self._moved_m = self.normal.way_m
+        return True
+
+    def _stand(self) -> None:
+        """Stand where the proxy says, at rest and without force."""
+        proxy = self.solid.proxy
+        self.depth_m = depth_m = proxy.depth_m if proxy.touching else 0.0
+        for channel in self.channels:
+            channel.in_contact = depth_m > 0.0
+            channel.x_m = -depth_m
+        self.normal.x_of_law_m = -depth_m
+        self._spring_n = self._moved_m = self._outside_s = 0.0
+        self._away = False
+        self._face()
+        self.quiet = depth_m == 0.0 and self.ledger.stored_j == 0.0
+
+    def _face(self) -> None:
+        """Count turns of the normal from here, and lay the directions along the surface anew."""
+        proxy = self.solid.proxy
+        normal = self.normal
+        nx, ny, nz = proxy.normal_x, proxy.normal_y, proxy.normal_z
+        self._ux = normal.dx = nx
+        self._uy = normal.dy = ny
+        self._uz = normal.dz = nz
+        self.turned = False
+        if len(self.channels) == 3:
+            lay_along(self.channels)
+
+    def _stretch_m(self) -> float:
+        """Length of the whole spring, from the device to the proxy [m]."""
+        proxy = self.solid.proxy
+        sx = self.depth_m * proxy.normal_x + proxy.stretch_x
+        sy = self.depth_m * proxy.normal_y + proxy.stretch_y
+        sz = self.depth_m * proxy.normal_z + proxy.stretch_z
+        return sqrt(sx * sx + sy * sy + sz * sz)
+
+    def _restore(self, limit_n: float) -> None:
+        """Book what a change of the solid does to its spring."""
+        stored_j = 0.0
+        if self.depth_m > 0.0 and self.solid.stiffness_n_per_m > 0.0:
+            stored_j = self.solid.stored_j(self._stretch_m(), limit_n)
+        self.moved_j += stored_j - self.ledger.stored_j
+        self.ledger.stored_j = stored_j

@@ -1,0 +1,310 @@
+"""The tick of a device with three axes: walls as ever, and what a scene with objects runs beside them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterable
+
+from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
+from hapticd.device import DeviceInfo, Sample
+from hapticd.errors import ConfigError
+from hapticd.shapes.pose import Vector
+from hapticd.shapes.reach import Nearby
+from hapticd.tick import fallback
+from hapticd.tick.contact import Contact, RunningLaw
+from hapticd.tick.event import EventCode
+from hapticd.tick.guard import Guard, Mode
+from hapticd.tick.space.books import SpaceBooks, Totals
+from hapticd.tick.space.channel import Channel
+from hapticd.tick.space.solid import Solid, compile_objects
+from hapticd.tick.space.solid_contact import SolidContact
+from hapticd.tick.tick import ControlTick
+
+_DISARMED, _ARMED = Mode.DISARMED, Mode.ARMED
+
+
+class SpaceTick(ControlTick):
+    """The state of the control loop on a device with three axes, between samples.
+
+    A scene without objects runs the tick of walls and nothing else. What is out of the device's reach is not looked at.
+
+    Attributes:
+        solids: one a solid, in scene order.
+        objects: how many objects the scene has.
+        awake: those that the device may touch, and those that are gone and whose force still fades out.
+        books: of all objects together.
+
+    Raises:
+        ConfigError: the scene or the way to find the velocity does not fit the device.
+    """
+
+    def __init__(
+        self,
+        scene: SceneConfig,
+        velocity: VelocityConfig,
+        guard: Guard,
+        info: DeviceInfo,
+        make_law: Callable[[], RunningLaw],
+        period_s: float,
+        ramp_s: float,
+    ) -> None:
+        super().__init__(scene, velocity, guard, info, make_law, period_s, ramp_s)
+        self.solids = [
+            SolidContact(solid, make_law, info.resolution_m) for solid in compile_objects(scene.objects, info, period_s)
+        ]
+        self.objects = len(scene.objects)
+        self.awake: list[SolidContact] = []
+        self.books = SpaceBooks()
+        self._fading: list[SolidContact] = []
+        self._held: list[SolidContact] = []
+        self._at: Vector = (0.0, 0.0, 0.0)
+        self._take_solids()
+        if info.start_m:
+            x, y, z = info.start_m
+            for contact in self.solids:
+                contact.start(x, y, z)
+                if contact.depth_m > 0.0:
+                    raise ConfigError(
+                        f'scene.objects[{contact.solid.index}] "{contact.solid.name}": swallows the device, which '
+                        f"starts {contact.depth_m * 1e3:.3g} mm inside it"
+                    )
+
+    def switch(
+        self,
+        scene: SceneConfig | None = None,
+        safety: SafetyConfig | None = None,
+        make_law: Callable[[], RunningLaw] | None = None,
+    ) -> Generator[None, None, None]:
+        """Take another scene, other limits, another law: all or nothing, and without a step in force.
+
+        An object goes on under its name: with its laws and its books, whatever about it is another. One that changed
+        comes in by a ramp, as what it held fades out; one that is gone fades out.
+
+        Raises:
+            ConfigError: the scene or the limits do not fit the device; nothing has changed then.
+            PluginError: the law cannot start; nothing has changed then.
+        """
+        make = self.make_law if make_law is None else make_law
+        there = self.solids
+        changed: list[tuple[SolidContact, Solid, list[Channel]]] = []
+        fading: list[tuple[SolidContact, list[tuple[Contact, RunningLaw]]]] = []
+        new: list[SolidContact] = []
+        if scene is not None:
+            solids = compile_objects(scene.objects, self.info, self.period_s)
+            yield
+            known = {contact.solid.name: contact for contact in self.solids}
+            there = []
+            for solid in solids:
+                contact = known.pop(solid.name, None)
+                if contact is None:
+                    contact = SolidContact(solid, make, self.info.resolution_m)
+                    new.append(contact)
+                elif not solid.same_as(contact.solid):
+                    changed.append((contact, solid, contact.rougher(solid, make)))
+                else:
+                    contact.solid.index = solid.index
+                there.append(contact)
+                yield
+            fading = [(contact, _still(contact.channels)) for contact in known.values()]
+        laws: list[tuple[Contact, RunningLaw]] = []
+        for contact in there:
+            if make_law is not None and contact not in new:
+                laws += [(channel, make()) for channel in contact.channels]
+                yield
+        fresh = [channel for contact in new for channel in contact.channels]
+        fresh += [channel for _, _, channels in changed for channel in channels]
+        for contact in new:
+            contact.start(*self._at)
+        laws += [(channel, channel.law) for channel in fresh]
+        self._start_laws(laws)
+        yield from super().switch(scene, safety, make_law)
+        # From here on nothing can fail.
+        limit_n = self.guard.limit_n
+        for contact, still in fading:
+            contact.let_go(limit_n)
+            self._fading.append(contact)
+            for channel, law in still:
+                self._take_law(channel, law)
+        blending: list[Channel] = []
+        for contact, solid, channels in changed:
+            if any(channel.applied_n != 0.0 for channel in contact.channels):
+                self._fade(contact)
+            contact.change(solid, channels, limit_n, self._at)
+            blending += contact.channels
+        self.solids = there
+        if scene is not None:
+            self.objects = len(scene.objects)
+        if self.fallback:
+            laws = self._start_laws([(channel, self._fallback_law()) for channel in fresh])
+        for channel, law in laws:
+            self._take_law(channel, law)
+        for one in blending:
+            self._blend(one)
+        self._take_solids()
+
+    def totals(self) -> Totals:
+        """The books of all walls and objects there ever were."""
+        totals = self.books.totals(self.awake)
+        totals.ledger.absorb(self.past)
+        for contact in self._active:
+            totals.ledger.absorb(contact.ledger)
+        return totals
+
+    def step_in_space(self, sample: Sample, clock_dt_s: float) -> list[float]:
+        """One tick of a scene with objects: `step`, with objects beside the walls.
+
+        Args:
+            sample: the newest state of the device.
+            clock_dt_s: time since the last tick on this computer's clock [s].
+
+        Returns:
+            The force to write, one element an axis [N]; the same list every time.
+        """
+        motion = self.motion
+        guard = self.guard
+        passed_s, periods = self.period_s, 1.0
+        if not self._simulated:
+            passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
+            periods = passed_s / self.period_s
+        seen = motion.see(sample, clock_dt_s, passed_s, self._blind)
+        if self._changing:
+            self._change_walls(periods)
+        if guard.mode is not _DISARMED:
+            if not sample.calibrated:
+                seen = False
+            elif motion.repeated:
+                if motion.frozen and guard.mode is _ARMED:
+                    silent_ms = motion.repeated_s * 1e3
+                    self.fail(EventCode.DEVICE_FROZEN, f"the device had nothing new for {silent_ms:.3g} ms")
+            elif seen and motion.watches_speed:
+                self._check_speed()
+        if not seen or self._blind:
+            if not seen or self._blind_gain > 0.0:
+                return self._step_blind(sample.calibrated, passed_s)
+            self._see_again()
+        position_m = motion.position_m
+        velocity_m_per_s = motion.velocity_m_per_s
+        requested_n = self.requested_n
+        force_n = self.force_n
+        dt_s = motion.dt_s
+        for axis in self._axes:
+            requested_n[axis] = force_n[axis] = 0.0
+        if dt_s > 0.0:
+            contacts = []
+            for contact in self._active:
+                wall = contact.wall
+                axis = wall.axis
+                x_m = wall.outward * (position_m[axis] - wall.position_m)
+                if x_m < 0.0 or contact.awake:
+                    contact.observe(x_m, velocity_m_per_s[axis], dt_s)
+                    contacts.append(contact)
+                else:
+                    contact.x_m = x_m
+            before_x, before_y, before_z = self._at
+            x, y, z = position_m
+            self._at = at = (x, y, z)
+            way = (x - before_x, y - before_y, z - before_z)
+            vx, vy, vz = velocity_m_per_s
+            if self._nearby.moved_out(x, y, z):
+                self._look_around()
+            self._held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
+            try:
+                for contact in contacts:
+                    contact.act(periods)
+                for solid in held:
+                    solid.act(periods)
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
+                self._replace_laws((contacts or self._under_law())[0], error, periods)
+                for solid in held:
+                    solid.act(periods)
+        else:
+            contacts = self._active
+            held = self._held
+            for waiting in contacts:
+                waiting.hold(periods)
+            for solid in held:
+                solid.hold(periods)
+        for contact in contacts:
+            wall = contact.wall
+            force_n[wall.axis] += wall.outward * contact.force_n
+            requested_n[wall.axis] += wall.outward * contact.requested_n
+        for solid in held:
+            solid.add(force_n, requested_n)
+        share = guard.reduce(force_n, passed_s)
+        gain = guard.gain
+        limit_n = guard.limit_n
+        for contact in contacts:
+            contact.settle(share, gain, limit_n, dt_s)
+        for solid in held:
+            solid.settle(share, gain, limit_n, dt_s)
+        if self.leaving:
+            self._drop_gone()
+        if self._fading:
+            self._drop_faded()
+        return force_n
+
+    def _under_law(self) -> list[Contact]:
+        return [*self.contacts, *(channel for contact in self.solids for channel in contact.channels)]
+
+    def _stand(self) -> None:
+        super()._stand()
+        x, y, z = self.motion.position_m
+        self._at = (x, y, z)
+        for contact in self.solids:
+            contact.start(x, y, z)
+        self._take_solids()
+
+    def _see_again(self) -> None:
+        super()._see_again()
+        for contact in self.solids:
+            for channel in contact.channels:
+                self._blend(channel)
+
+    def _take_solids(self) -> None:
+        """Run what the scene needs from now on."""
+        self._nearby = Nearby([contact.solid.proxy for contact in self.solids])
+        self.has_objects = self.has_objects or bool(self.solids)  # and their books once they are gone
+        self.advance = self.step_in_space if self.has_objects else self.step
+        self._look_around()
+
+    def _look_around(self) -> None:
+        """Find out which solids are in reach; one that comes into reach is begun with."""
+        near = set(self._nearby.look(*self._at))
+        before = set(map(id, self.awake))
+        self.awake = list(self._fading)
+        self._held = [contact for contact in self._held if contact in self._fading or contact in self.solids]
+        resting = []
+        for at, contact in enumerate(self.solids):
+            if at in near or not contact.quiet:
+                if id(contact) not in before and contact.quiet:
+                    contact.start(*self._at)
+                self.awake.append(contact)
+            else:
+                resting.append(contact)
+        self.books.rest(resting)
+
+    def _fade(self, contact: SolidContact) -> None:
+        """Have what a contact applies fade out beside it."""
+        shade = contact.shade(_no_law)
+        self._fading.append(shade)
+        for channel in shade.channels:
+            self._blend(channel)
+
+    def _drop_faded(self) -> None:
+        """Close the books of what has faded out."""
+        gone = [contact for contact in self._fading if contact.faded]
+        if gone:
+            for contact in gone:
+                self.books.close(contact)
+            self._fading = [contact for contact in self._fading if contact not in gone]
+            self._take_solids()
+
+
+def _no_law() -> RunningLaw:
+    return RunningLaw(fallback, fallback.Params(damping_n_s_per_m=0.0))
+
+
+def _still(channels: Iterable[Contact]) -> list[tuple[Contact, RunningLaw]]:
+    return [(channel, _no_law()) for channel in channels]
