@@ -28,8 +28,9 @@ from hapticd.device import DeviceInfo
 from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.records import Status
 from hapticd.telemetry.wire import Topic, measure_epoch_offset_ns
+from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.flags import Flag
-from hapticd.tick.record import TickRecord, WallRecord
+from hapticd.tick.record import TickRecord
 
 RATE_HZ = 1000
 PERIOD_NS = 1_000_000

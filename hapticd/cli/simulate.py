@@ -7,15 +7,16 @@ import json
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from hapticd.config.loading import load
 from hapticd.errors import ConfigError, HapticdError
-from hapticd.offline.rehearsal import ticks_in
+from hapticd.offline.rehearsal import columns_of, ticks_in
 from hapticd.offline.run import Row
 from hapticd.offline.simulate import simulate as simulated
+from hapticd.offline.space_row import SpaceRow
 from hapticd.offline.traces import open_trace
 from hapticd.progress import progress_bar
 
@@ -59,7 +60,9 @@ def simulate(
     t_s, x_m, v_m_per_s (both true), x_measured_m, force_n (applied), force_requested_n, energy_j (into the walls),
     cycle, damping_n_s_per_m, in_contact
 
-    x is relative to the first wall and negative inside it; a positive force pushes out. The file appears when it is
+    x is relative to the first wall and negative inside it; a positive force pushes out. A device with several axes has
+    more columns: position, velocity, measured position and force along each, the object that is touched, and its depth;
+    without a wall x is less that depth. The file appears when it is
     complete. The summary says what became of the run, by its last 0.5 s. Exits with 1 when the daemon would have
     stopped for a fault; the rows up to there are kept.
 
@@ -79,9 +82,9 @@ def simulate(
     loaded = load(config)
     ticks = ticks_in(loaded, duration)
     with contextlib.ExitStack() as stack:
-        take: Callable[[Row], object] = _drop
+        take: Callable[[Any], object] = _drop
         if output is not None:
-            take = stack.enter_context(open_trace(output, ticks, overwrite)).append
+            take = stack.enter_context(open_trace(output, ticks, overwrite, columns_of(loaded))).append
         tell = stack.enter_context(progress_bar(ticks, "simulating"))
         run = simulated(loaded, duration, take=take, progress=lambda done: tell(completed=done))
     if as_json:
@@ -123,5 +126,5 @@ def _replay(
     typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join(lines))
 
 
-def _drop(_row: Row) -> None:
+def _drop(_row: Row | SpaceRow) -> None:
     """The rows are not wanted, and an hour of them would fill the memory."""

@@ -18,7 +18,7 @@ from hapticd.client.daemon import DaemonClient, connect
 from hapticd.client.decode import decode
 from hapticd.errors import ClientError, InstanceError, SchemaError, SilenceError, WireError
 from hapticd.keys.client import RefusedKeyError
-from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Status, Timing
+from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Status, Timing, Touch
 from hapticd.tick.event import EventCode
 
 __all__ = [
@@ -42,6 +42,7 @@ __all__ = [
     "SilenceError",
     "Status",
     "Timing",
+    "Touch",
     "WireError",
     "connect",
     "decode",

@@ -10,7 +10,7 @@ from typing import Any
 import msgpack
 
 from hapticd.errors import WireError
-from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Input, Position, Sent, Status, Timing
+from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Input, Position, Sent, Status, Timing, Touch
 
 
 def decode(topic: bytes, payload: bytes) -> list[Sent]:
@@ -130,5 +130,5 @@ class _Reader:
 
 _READERS: dict[bytes, _Reader] = {
     record.topic.encode(): _Reader(record)
-    for record in (Position, Energy, Damping, Timing, Cycle, Input, Event, Status)
+    for record in (Position, Energy, Damping, Touch, Timing, Cycle, Input, Event, Status)
 }

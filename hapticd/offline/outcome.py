@@ -14,6 +14,7 @@ from typing import Any
 
 from hapticd.config.models import WallConfig
 from hapticd.simulation.options import ConstantForce, RampForce, SimulationOptions, StepForce
+from hapticd.simulation.space_options import ConstantPush, HoldPath, LetGoPush, PressPush
 
 
 class Outcome(IntEnum):
@@ -119,7 +120,7 @@ def balance(device: SimulationOptions, walls: Sequence[WallConfig]) -> Balance:
     plane; the balance is found wall by wall, from the outermost one on.
     """
     force_n = pressing_n(device)
-    if not force_n > 0.0 or not walls or any(wall.free_side != walls[0].free_side for wall in walls):
+    if device.axes > 1 or not force_n > 0.0 or not walls or any(wall.free_side != walls[0].free_side for wall in walls):
         return Balance(math.nan, 0.0)
     outward = 1.0 if walls[0].free_side == "positive" else -1.0
     planes = []
@@ -139,6 +140,12 @@ def balance(device: SimulationOptions, walls: Sequence[WallConfig]) -> Balance:
         moment += stiffness * plane_m
         x_m = (moment - force_n) / total if total > 0.0 else math.nan
     return Balance(x_m, total)
+
+
+def comes_to_rest(device: SimulationOptions) -> bool:
+    """Whether the hand of a device with several axes comes to an end of all that it does."""
+    hand = device.space.hand
+    return isinstance(hand.force, ConstantPush | PressPush | LetGoPush) and isinstance(hand.aim, HoldPath | None)
 
 
 def pressing_n(device: SimulationOptions) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,11 +16,17 @@ from hapticd.config.loading import LoadedConfig
 from hapticd.errors import ConfigError, DriverError
 from hapticd.offline.outcome import Criterion, balance
 from hapticd.offline.run import Row, Run, window_ticks
+from hapticd.offline.space_row import SpaceRow, length, three
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.driver import SimulatedDriver
 from hapticd.simulation.options import FARTHEST_M, SimulationOptions
 from hapticd.tick.assemble import make_tick, place_device
+from hapticd.tick.contact import Contact
+from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.guard import Mode
+from hapticd.tick.space.solid_contact import SolidContact
+from hapticd.tick.space.tick import SpaceTick
+from hapticd.tick.tick import ControlTick
 
 LONGEST_S = 1e9
 """The longest run [s]."""
@@ -28,8 +34,10 @@ LONGEST_S = 1e9
 _CHUNK_TICKS = 2000
 """Ticks that are collected at once; progress hears as often."""
 
-_CODES = {"cycle": "q", "in_contact": "b"}
+_CODES = {"cycle": "q", "in_contact": "b", "touched": "q"}
 """Type codes of the columns that hold no floats."""
+
+MakeRows = Callable[["Rehearsal", int, int], Iterator["Row | SpaceRow"]]
 
 MakeDevice = Callable[[SimulationOptions, float], SimulatedDevice]
 """Makes the model of a device, given its options and the period [s]."""
@@ -44,7 +52,8 @@ class Rehearsal:
         make_device: makes the device model.
 
     Attributes:
-        model: the simulated device.
+        model: the simulated device, along its first axis.
+        space: the same in several axes; None where it has one.
         tick: the daemon's tick on it.
         fault: why the daemon would have stopped, once it is known; None as long as it would not.
         diverged: whether the model left all bounds.
@@ -72,7 +81,8 @@ class Rehearsal:
         place_device(loaded, self._driver)
         self._driver.open()
         try:
-            self.model = self._driver.model
+            self.space = self._driver.space
+            self.model = self._driver.model if self.space is None else self.space.axes[0]
             self.tick = make_tick(loaded, self._driver.info)
         except BaseException:
             self._driver.close()
@@ -88,7 +98,7 @@ class Rehearsal:
             tick.arm()
             for count in range(ticks):
                 sample = driver.read()
-                force_n = tick.step(sample, self.period_s)
+                force_n = tick.advance(sample, self.period_s)
                 if guard.mode is not Mode.DISARMED:
                     driver.write(force_n)
                 else:
@@ -99,7 +109,8 @@ class Rehearsal:
                 yield count
         except DriverError as error:
             self.fault = self.fault or str(error)
-            self.diverged = not abs(self.model.measured_m) < FARTHEST_M
+            at_m = [self.model.measured_m] if self.space is None else self.space.measured_m
+            self.diverged = not all(abs(x_m) < FARTHEST_M for x_m in at_m)
         finally:
             driver.close()
 
@@ -118,6 +129,15 @@ def simulation_options(loaded: LoadedConfig) -> SimulationOptions:
     if loaded.options.clock != "ticks":
         raise ConfigError(f'{loaded.path}: device.options.clock = "{loaded.options.clock}": must be "ticks" offline')
     return loaded.options
+
+
+def columns_of(loaded: LoadedConfig) -> tuple[str, ...]:
+    """Names of the columns that a run of a configuration has.
+
+    Raises:
+        ConfigError: it is not one for a simulated device.
+    """
+    return Row._fields if simulation_options(loaded).axes == 1 else SpaceRow._fields
 
 
 def ticks_in(loaded: LoadedConfig, duration_s: float) -> int:
@@ -139,7 +159,7 @@ def rehearse(
     duration_s: float,
     options: SimulationOptions | None = None,
     make_device: MakeDevice | None = None,
-    take: Callable[[Row], object] | None = None,
+    take: Callable[[Any], object] | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Run:
     """Run a configuration from the first tick to the last, or to where the model has diverged.
@@ -158,12 +178,14 @@ def rehearse(
     """
     ticks = ticks_in(loaded, duration_s)
     rehearsal = Rehearsal(loaded, options, make_device)
-    device = rehearsal.model.options
+    space = rehearsal.space
+    device = rehearsal.model.options if space is None else space.options
     at = balance(device, loaded.config.scene.walls)
     keep = None if take is None else window_ticks(rehearsal.period_s)
-    collected = _Collected(at.x_m, Criterion().place_limit_m(device, at), keep)
-    chunk: list[Row] = []
-    for row in _rows(rehearsal, ticks, loaded.config.loop.period_ns):
+    collected = _Collected(at.x_m, Criterion().place_limit_m(device, at), keep, columns_of(loaded))
+    chunk: list[Row | SpaceRow] = []
+    make_rows: MakeRows = _rows if space is None else _rows_in_space
+    for row in make_rows(rehearsal, ticks, loaded.config.loop.period_ns):
         chunk.append(row)
         if take is not None:
             take(row)
@@ -185,8 +207,8 @@ def rehearse(
         left_place_tick=collected.left_place_tick,
         peak_force_n=collected.peak_n,
         stiffness_n_per_m=contacts[0].wall.stiffness_n_per_m if contacts else math.nan,
-        generated_j=sum([contact.ledger.generated_j for contact in contacts]),
-        dissipated_j=sum([contact.ledger.dissipated_j for contact in contacts]),
+        generated_j=sum([ledger.generated_j for ledger in _ledgers(rehearsal.tick)]),
+        dissipated_j=sum([ledger.dissipated_j for ledger in _ledgers(rehearsal.tick)]),
         fault=rehearsal.fault,
         diverged=rehearsal.diverged,
     )
@@ -213,11 +235,62 @@ def _rows(rehearsal: Rehearsal, ticks: int, period_ns: int) -> Iterator[Row]:
         )
 
 
+def _rows_in_space(rehearsal: Rehearsal, ticks: int, period_ns: int) -> Iterator[SpaceRow]:
+    tick, device = rehearsal.tick, rehearsal.space
+    assert device is not None
+    first = tick.contacts[0] if tick.contacts else None
+    for count in rehearsal.run(ticks):
+        position, velocity = three(device.position_m), three(device.velocity_m_per_s)
+        measured, force = three(tick.motion.position_m), three(tick.force_n)
+        deepest = max(_touched(tick), key=lambda contact: contact.depth_m, default=None)
+        if first is not None:
+            wall = first.wall
+            x_m = wall.outward * (position[wall.axis] - wall.position_m)
+            along = (x_m, wall.outward * velocity[wall.axis], first.x_m)
+            forces = (wall.outward * tick.force_n[wall.axis], wall.outward * tick.requested_n[wall.axis])
+            shown: Contact | None = first
+        elif deepest is not None:
+            normal = deepest.normal
+            v_m_per_s = normal.dx * velocity[0] + normal.dy * velocity[1] + normal.dz * velocity[2]
+            along = (-deepest.depth_m, v_m_per_s, -deepest.depth_m)
+            forces = (length(tick.force_n), length(tick.requested_n))
+            shown = normal
+        else:
+            along, forces, shown = (0.0, 0.0, 0.0), (length(tick.force_n), length(tick.requested_n)), None
+        yield SpaceRow(
+            count * period_ns / 1e9,
+            *along,
+            *forces,
+            sum([ledger.energy_j for ledger in _ledgers(tick)]),
+            shown.ledger.cycle if shown else 0,
+            shown.damping_n_s_per_m if shown else 0.0,
+            int(shown.in_contact) if shown else 0,
+            *position,
+            *velocity,
+            *measured,
+            *force,
+            deepest.solid.index if deepest else -1,
+            deepest.depth_m if deepest else 0.0,
+        )
+
+
+def _touched(tick: ControlTick) -> list[SolidContact]:
+    if not isinstance(tick, SpaceTick):
+        return []
+    return [contact for contact in tick.solids if contact.in_contact]
+
+
+def _ledgers(tick: ControlTick) -> list[EnergyLedger]:
+    """The books of all walls and objects."""
+    solids = [contact.ledger for contact in tick.solids] if isinstance(tick, SpaceTick) else []
+    return [contact.ledger for contact in tick.contacts] + solids
+
+
 class _Collected:
     """Rows as columns, and what must be known of those that are not kept."""
 
-    def __init__(self, rest_m: float, band_m: float, keep: int | None) -> None:
-        self.columns: dict[str, array[Any]] = {name: array(_CODES.get(name, "d")) for name in Row._fields}
+    def __init__(self, rest_m: float, band_m: float, keep: int | None, names: Sequence[str]) -> None:
+        self.columns: dict[str, array[Any]] = {name: array(_CODES.get(name, "d")) for name in names}
         self.ticks = 0
         self.left_place_tick = -1
         self.peak_n = 0.0
@@ -225,7 +298,7 @@ class _Collected:
         self._band_m = band_m
         self._keep = keep
 
-    def add(self, rows: list[Row]) -> None:
+    def add(self, rows: Sequence[Row | SpaceRow]) -> None:
         """Take rows in."""
         for column, values in zip(self.columns.values(), zip(*rows, strict=True), strict=False):
             column.extend(values)

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from hapticd.config.models import Config
 from hapticd.errors import HapticdError
 from hapticd.offline.column import Column
-from hapticd.offline.outcome import Balance, Criterion, Outcome, balance
+from hapticd.offline.outcome import Balance, Criterion, Outcome, balance, comes_to_rest
+from hapticd.offline.space_row import MEASURED, POSITION, length
 from hapticd.simulation.options import SimulationOptions
 
 if TYPE_CHECKING:
@@ -110,6 +111,11 @@ class Run:
         """How long that is [s]."""
         return min(self.ticks, window_ticks(self.period_s)) * self.period_s
 
+    @property
+    def in_space(self) -> bool:
+        """Whether the device has several axes, and the run a column for each."""
+        return self.options.axes > 1
+
     @cached_property
     def balance(self) -> Balance:
         """Where hand and springs balance at the end."""
@@ -122,6 +128,9 @@ class Run:
             return Outcome.DIVERGED
         if self.fault is not None:
             return Outcome.STOPPED
+        if self.in_space and comes_to_rest(self.options):  # where is what it pushes back that decides
+            still = self.peak_to_peak_m <= Criterion().still_limit_m(self.options)
+            return Outcome.SETTLED if still else Outcome.MOVING
         if math.isnan(self.balance.x_m):
             return Outcome.RUNS
         return Criterion().outcome(self.options, self.balance, self.peak_to_peak_m, self.mean_m)
@@ -144,12 +153,16 @@ class Run:
 
     @cached_property
     def peak_to_peak_m(self) -> float:
-        """Span of the true position at the end [m]."""
+        """Span of the true position at the end; in space the length of the spans along all axes [m]."""
+        if self.in_space:
+            return length([_span(self._last(name)) for name in POSITION])
         return _span(self._last("x_m"))
 
     @cached_property
     def measured_peak_to_peak_m(self) -> float:
-        """Span of the measured position at the end [m]."""
+        """Span of the measured position at the end; in space as that of the true one [m]."""
+        if self.in_space:
+            return length([_span(self._last(name)) for name in MEASURED])
         return _span(self._last("x_measured_m"))
 
     @cached_property

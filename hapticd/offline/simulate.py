@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from hapticd.config.loading import LoadedConfig, load
 from hapticd.offline.model_choice import fitted
 from hapticd.offline.rehearsal import rehearse
-from hapticd.offline.run import Row, Run
+from hapticd.offline.run import Run
 
 
 def simulate(
     config: LoadedConfig | Path | str,
     duration_s: float = 2.0,
     *,
-    take: Callable[[Row], object] | None = None,
+    take: Callable[[Any], object] | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Run:
     """Run a configuration on its simulated device, with the daemon's tick and the daemon's numbers to the last bit.

@@ -8,12 +8,14 @@ from __future__ import annotations
 import os
 import shutil
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
 
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.offline.run import Row
+from hapticd.offline.space_row import SpaceRow
 from hapticd.replacing import obstacle, put
 
 CSV_ROW_BYTES = 130
@@ -30,15 +32,17 @@ class TraceFile(ABC):
 
     Args:
         path: its name in the end.
+        names: of the columns.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
         self.path = path
+        self.names = names
         self._part = path.with_name(f".{path.name}.{os.getpid()}.part")
         self._file: IO[Any] = self._create()
 
     @abstractmethod
-    def append(self, row: Row) -> None:
+    def append(self, row: Row | SpaceRow) -> None:
         """Take a row in."""
 
     def __enter__(self) -> TraceFile:
@@ -67,7 +71,7 @@ class TraceFile(ABC):
 class CsvTrace(TraceFile):
     """A header line, then a line a tick; every number with the digits that give the same float again."""
 
-    def append(self, row: Row) -> None:
+    def append(self, row: Row | SpaceRow) -> None:
         """Write a row."""
         try:
             self._file.write(",".join(map(repr, row)) + "\n")
@@ -79,7 +83,7 @@ class CsvTrace(TraceFile):
 
     def _create(self) -> IO[Any]:
         file = self._part.open("x", encoding="ascii", newline="")
-        file.write(",".join(Row._fields) + "\n")
+        file.write(",".join(self.names) + "\n")
         return file
 
 
@@ -88,20 +92,21 @@ class NpzTrace(TraceFile):
 
     Args:
         path: its name in the end.
+        names: of the columns.
         rows: how many there will be at most.
     """
 
-    def __init__(self, path: Path, rows: int) -> None:
+    def __init__(self, path: Path, names: Sequence[str], rows: int) -> None:
         import numpy as np
 
         self._np = np
-        kinds: dict[str, Any] = {"cycle": np.int64, "in_contact": np.bool_}
-        self._columns = {name: np.empty(rows, kinds.get(name, np.float64)) for name in Row._fields}
+        kinds: dict[str, Any] = {"cycle": np.int64, "in_contact": np.bool_, "touched": np.int64}
+        self._columns = {name: np.empty(rows, kinds.get(name, np.float64)) for name in names}
         self._arrays = tuple(self._columns.values())
         self._count = 0
-        super().__init__(path)
+        super().__init__(path, names)
 
-    def append(self, row: Row) -> None:
+    def append(self, row: Row | SpaceRow) -> None:
         """Keep a row."""
         at = self._count
         for array, value in zip(self._arrays, row, strict=True):
@@ -113,13 +118,14 @@ class NpzTrace(TraceFile):
         self._np.savez(self._file, **columns)
 
 
-def open_trace(path: Path, rows: int, overwrite: bool) -> TraceFile:
+def open_trace(path: Path, rows: int, overwrite: bool, names: Sequence[str] = Row._fields) -> TraceFile:
     """Begin a file, after everything has been checked that could fail once the work is done.
 
     Args:
         path: where; its suffix says in which format.
         rows: how many there will be at most.
         overwrite: whether a file of this name may be replaced.
+        names: of the columns.
 
     Raises:
         ConfigError: the name, the place or the size makes it impossible.
@@ -135,11 +141,11 @@ def open_trace(path: Path, rows: int, overwrite: bool) -> TraceFile:
         raise ConfigError(f"{path}: exists; add --overwrite to replace it")
     if not path.parent.is_dir():
         raise ConfigError(f"{path}: there is no directory {path.parent}")
-    _check_room(path, rows)
+    _check_room(path, rows, len(names))
     try:
         if path.suffix == ".csv":
-            return CsvTrace(path)
-        return NpzTrace(path, rows)
+            return CsvTrace(path, names)
+        return NpzTrace(path, names, rows)
     except ModuleNotFoundError as error:
         raise HapticdError(f"{path}: needs {error.name}: pip install 'hapticd[study]'; a .csv does not") from None
     except MemoryError:
@@ -148,13 +154,13 @@ def open_trace(path: Path, rows: int, overwrite: bool) -> TraceFile:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from None
 
 
-def _check_room(path: Path, rows: int) -> None:
+def _check_room(path: Path, rows: int, columns: int) -> None:
     """Refuse what disk or memory cannot hold.
 
     Raises:
         ConfigError: with the numbers.
     """
-    bytes_needed = rows * _SUFFIXES[path.suffix]
+    bytes_needed = rows * _SUFFIXES[path.suffix] * columns // len(Row._fields)
     if path.suffix == ".npz" and bytes_needed > (free := _free_memory()):
         raise ConfigError(
             f"{path}: {rows} ticks take {_size(bytes_needed)} of memory and {_size(free)} are free; "

@@ -24,6 +24,7 @@ from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
 from hapticd.telemetry import wire
 from hapticd.telemetry.wire import INVALID, Inputs, Map, Topic, timestamp_s
+from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.record import TickRecord
 
@@ -103,6 +104,8 @@ class Publisher:
         self._position: list[Map] = []
         self._energy: list[Map] = []
         self._damping: list[Map] = []
+        self._contact: list[Map] = []
+        self._objects = wire.Objects()
         self._timing: list[Map] = []
         self._input: list[Map] = []
         self._batch_due_ns: int | None = None
@@ -159,12 +162,13 @@ class Publisher:
         for record in records:
             timestamp = timestamp_s(record.deadline_ns, self._offset_ns)
             self._seq = record.seq
-            for wall, _ in self._cycles.completed(record):
-                cycles.append(wire.cycle_map(record, timestamp, wall))
+            for contact, _ in self._cycles.completed(record):
+                cycles.append(wire.cycle_map(record, timestamp, contact))
+            contacts = self._objects.see(record)
             if self._has_input:
                 self._add_input(record, timestamp)
             if record.seq % self._every_ticks == 0:
-                self._add_tick(record, timestamp)
+                self._add_tick(record, timestamp, contacts)
         if cycles:
             self.counts.cycles += len(cycles)
             self._send(Topic.CYCLE, cycles)
@@ -225,7 +229,7 @@ class Publisher:
             self._ipc_path.unlink(missing_ok=True)
             self._ipc_path = None
 
-    def _add_tick(self, record: TickRecord, timestamp: float) -> None:
+    def _add_tick(self, record: TickRecord, timestamp: float, contacts: Sequence[WallRecord]) -> None:
         if self._batch_due_ns is None:
             self._batch_due_ns = record.deadline_ns + BATCH_NS
         elif record.deadline_ns >= self._batch_due_ns:
@@ -233,7 +237,8 @@ class Publisher:
             self._batch_due_ns = record.deadline_ns + BATCH_NS
         self._position.append(wire.position_map(record, timestamp))
         self._energy.append(wire.energy_map(record, timestamp))
-        self._damping.append(wire.damping_map(record, timestamp))
+        self._damping.append(wire.damping_map(record, timestamp, contacts))
+        self._contact += wire.contact_maps(record, timestamp)
         self._timing.append(wire.timing_map(record, timestamp))
         self.counts.ticks += 1
         if len(self._position) >= self._batch_ticks:
@@ -270,6 +275,7 @@ class Publisher:
             (Topic.POSITION, self._position),
             (Topic.ENERGY, self._energy),
             (Topic.DAMPING, self._damping),
+            (Topic.CONTACT, self._contact),
             (Topic.TIMING, self._timing),
             (Topic.INPUT, self._input),
         ):

@@ -47,6 +47,10 @@ class Energy:
         spring_energy_j: stored in its springs [J].
         dissipated_j: taken by wall damping and law [J].
         generated_j: made by sampling and hold [J].
+        scene_work_j: work that changes of objects did on their springs [J]; with this taken off, `energy_j` is what is
+            stored and dissipated less what was generated.
+        friction_j: energy that slipping on objects took, a part of what is dissipated [J].
+        friction_energy_j: in the springs along the surfaces of objects now, a part of what is stored [J].
         invalid: a value was not finite and stands here as 0.
     """
 
@@ -58,18 +62,21 @@ class Energy:
     spring_energy_j: float
     dissipated_j: float
     generated_j: float
+    scene_work_j: float = 0.0
+    friction_j: float = 0.0
+    friction_energy_j: float = 0.0
     invalid: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Damping:
-    """One tick: what the law did, one element a wall.
+    """One tick: what the law did, one element a wall and then one an object.
 
     Attributes:
         timestamp: seconds since the epoch at the tick's deadline [s].
         seq: tick number.
         damping_n_s_per_m: damping of the law [N s/m].
-        in_contact: whether the device was inside the wall.
+        in_contact: whether the device was inside the wall or object.
         felt_mass_kg: mass that the law has identified [kg]; 0 while unknown.
         invalid: a value was not finite and stands here as 0.
     """
@@ -81,6 +88,35 @@ class Damping:
     damping_n_s_per_m: tuple[float, ...]
     in_contact: tuple[bool, ...]
     felt_mass_kg: tuple[float, ...]
+    invalid: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """One tick: an object that was touched. A tick has one for each of them, and none where nothing is touched.
+
+    Attributes:
+        timestamp: seconds since the epoch at the tick's deadline [s].
+        seq: tick number.
+        object: index of the object; `Status.object_name` has its name.
+        proxy_m: the point on its surface that pulled the device back [m].
+        normal: from the device to the surface, outward, a unit vector.
+        depth_m: how far that was [m].
+        force_n: force that it applied to the device [N].
+        sliding: whether friction slipped.
+        invalid: a value was not finite and stands here as 0.
+    """
+
+    topic: ClassVar[Topic] = Topic.CONTACT
+
+    timestamp: float
+    seq: int
+    object: int
+    proxy_m: tuple[float, ...]
+    normal: tuple[float, ...]
+    depth_m: float
+    force_n: tuple[float, ...]
+    sliding: bool
     invalid: bool = False
 
 
@@ -111,13 +147,13 @@ class Timing:
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """One completed cycle of energy exchange with a wall.
+    """One completed cycle of energy exchange with a wall or an object.
 
     Attributes:
         timestamp: seconds since the epoch at its end [s].
         seq: tick number of its end.
-        contact: index of the wall.
-        cycle: number of the cycle at this wall.
+        contact: index of the wall; objects count behind the walls.
+        cycle: number of the cycle there.
         energy_j: energy at its end [J].
         generated_j: energy that it generated [J].
         damping_n_s_per_m: damping of the law when it ended [N s/m].
@@ -287,6 +323,10 @@ class Status:
         wall_axis: axis of each wall, in scene order.
         wall_position_m: where each wall is on its axis [m].
         wall_stiffness_n_per_m: its stiffness now, with the changes over time that the file names [N/m].
+        object_name: name of each object, in scene order.
+        object_shape: its shape.
+        object_position_m: where it is, three numbers an object [m].
+        object_stiffness_n_per_m: its stiffness [N/m].
         config_file: the file that is in force.
         config_hash: of its content.
         realtime: scheduling and memory are as the loop needs them.
@@ -339,6 +379,10 @@ class Status:
     wall_axis: tuple[str, ...] = ()
     wall_position_m: tuple[float, ...] = ()
     wall_stiffness_n_per_m: tuple[float, ...] = ()
+    object_name: tuple[str, ...] = ()
+    object_shape: tuple[str, ...] = ()
+    object_position_m: tuple[float, ...] = ()
+    object_stiffness_n_per_m: tuple[float, ...] = ()
     config_file: str = ""
     config_hash: str = ""
     realtime: bool = False
@@ -357,5 +401,5 @@ class Status:
 
 
 Tick: TypeAlias = Position | Energy | Damping | Timing
-Sent: TypeAlias = Tick | Cycle | Input | Event | Status
+Sent: TypeAlias = Tick | Touch | Cycle | Input | Event | Status
 Record: TypeAlias = Sent | Gap

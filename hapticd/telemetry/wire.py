@@ -9,14 +9,15 @@ from __future__ import annotations
 import enum
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from struct import Struct
 from typing import Any, Protocol
 
 import msgpack
 
+from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.event import LoopEvent
-from hapticd.tick.record import TickRecord, WallRecord
+from hapticd.tick.record import TickRecord
 
 SCHEMA = 1
 """Version of the contract; goes up only when a key changes its meaning or goes, which clients must notice."""
@@ -33,6 +34,7 @@ class Topic(enum.StrEnum):
     POSITION = "hapticd/position"
     ENERGY = "hapticd/energy"
     DAMPING = "hapticd/damping"
+    CONTACT = "hapticd/contact"
     TIMING = "hapticd/timing"
     CYCLE = "hapticd/cycle"
     INPUT = "hapticd/input"
@@ -113,21 +115,75 @@ def energy_map(record: TickRecord, timestamp: float) -> Map:
         "generated_j": record.generated_j,
     }
     total = record.energy_j + record.spring_energy_j + record.dissipated_j + record.generated_j
+    space = record.space
+    if space is not None:
+        fields["scene_work_j"] = space.moved_j
+        fields["friction_j"] = space.friction_j
+        fields["friction_energy_j"] = space.friction_energy_j
+        total += space.moved_j + space.friction_j + space.friction_energy_j
     return fields if math.isfinite(total) else plain_map(fields)
 
 
-def damping_map(record: TickRecord, timestamp: float) -> Map:
-    """hapticd/damping: what the law does at each wall."""
-    damping = [wall.damping_n_s_per_m for wall in record.walls]
-    mass = [wall.felt_mass_kg for wall in record.walls]
+class Objects:
+    """What is known of every object: a record has those in reach only, and of the others nothing changes."""
+
+    def __init__(self) -> None:
+        self._known: list[WallRecord] = []
+
+    def see(self, record: TickRecord) -> Sequence[WallRecord]:
+        """Walls and objects of a record, in scene order; records must come in order."""
+        space = record.space
+        if space is None:
+            self._known = []
+            return record.walls
+        if len(self._known) != space.objects:
+            self._known = [_UNTOUCHED] * space.objects
+        for one in space.near:
+            self._known[one.index] = one.contact
+        return [*record.walls, *self._known]
+
+
+def damping_map(record: TickRecord, timestamp: float, contacts: Sequence[WallRecord] | None = None) -> Map:
+    """hapticd/damping: what the law does at each wall, and then at each object.
+
+    Args:
+        record: the tick.
+        timestamp: of its deadline [s].
+        contacts: walls and objects; None: the walls of the record.
+    """
+    contacts = record.walls if contacts is None else contacts
+    damping = [contact.damping_n_s_per_m for contact in contacts]
+    mass = [contact.felt_mass_kg for contact in contacts]
     fields: Map = {
         "timestamp": timestamp,
         "seq": record.seq,
         "damping_n_s_per_m": damping,
-        "in_contact": [wall.in_contact for wall in record.walls],
+        "in_contact": [contact.in_contact for contact in contacts],
         "felt_mass_kg": mass,
     }
     return fields if math.isfinite(sum(damping) + sum(mass)) else plain_map(fields)
+
+
+def contact_maps(record: TickRecord, timestamp: float) -> list[Map]:
+    """hapticd/contact: a map for each object that is touched."""
+    if record.space is None:
+        return []
+    return [
+        plain_map(
+            {
+                "timestamp": timestamp,
+                "seq": record.seq,
+                "object": one.index,
+                "proxy_m": one.proxy_m,
+                "normal": one.normal,
+                "depth_m": one.depth_m,
+                "force_n": one.force_n,
+                "sliding": one.sliding,
+            }
+        )
+        for one in record.space.near
+        if one.contact.in_contact
+    ]
 
 
 def timing_map(record: TickRecord, timestamp: float) -> Map:
@@ -164,9 +220,16 @@ class Cycles:
 
     def __init__(self) -> None:
         self._last: list[bytes] = []
+        self._of_objects: dict[int, int] = {}
 
     def completed(self, record: TickRecord) -> Iterator[tuple[int, int]]:
-        """Wall and number of each cycle that ended in this record; records must come in order."""
+        """Contact and number of each cycle that ended in this record, walls before objects; records come in order."""
+        if record.space is not None:
+            for one in record.space.near:
+                number = one.contact.cycle
+                if number > 0 and number != self._of_objects.get(one.index, 0):
+                    yield len(record.walls) + one.index, number
+                self._of_objects[one.index] = number
         before, self._last = self._last, [_cycle(wall) for wall in record.walls]
         if self._last == before:
             return
@@ -184,14 +247,18 @@ class Cycles:
                 yield index, record.walls[index].cycle
 
 
-def cycle_map(record: TickRecord, timestamp: float, wall: int) -> Map:
-    """hapticd/cycle: the cycle that a wall completed in this record."""
-    ended = record.walls[wall]
+def cycle_map(record: TickRecord, timestamp: float, contact: int) -> Map:
+    """hapticd/cycle: the cycle that a wall, or behind the walls an object, completed in this record."""
+    walls = len(record.walls)
+    if contact < walls or record.space is None:
+        ended = record.walls[contact]
+    else:
+        ended = next(one.contact for one in record.space.near if one.index == contact - walls)
     return plain_map(
         {
             "timestamp": timestamp,
             "seq": record.seq,
-            "contact": wall,
+            "contact": contact,
             "cycle": ended.cycle,
             "energy_j": ended.cycle_energy_j,
             "generated_j": ended.cycle_generated_j,
@@ -226,6 +293,7 @@ def new_packer() -> msgpack.Packer:
     return msgpack.Packer(use_bin_type=True, unicode_errors="replace")
 
 
+_UNTOUCHED = WallRecord(False, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0.0, 0.0)
 _CYCLE = Struct("<qddd")
 
 

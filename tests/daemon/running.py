@@ -96,12 +96,12 @@ class Daemon:
                     return int(entry.name)
         return 0
 
-    def memory(self) -> SharedMemory:
+    def memory(self, axes: int = 1) -> SharedMemory:
         """The control process's shared memory, which outlives it while we hold it."""
         pid = self.control_pid()
         for link in Path(f"/proc/{pid}/fd").iterdir():
             if str(link.readlink()) == "/memfd:hapticd (deleted)":
-                layout = RecordLayout(1, False, 8)
+                layout = RecordLayout(axes, False, 8)
                 return SharedMemory(layout, 1000.0, os.open(link, os.O_RDWR | os.O_CLOEXEC))
         raise AssertionError("the control process has no shared memory")
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.telemetry.wire import Cycles
-from hapticd.tick.record import WallRecord
+from hapticd.tick.contact_record import WallRecord
 from tests.telemetry.sockets import ticks
 
 LAGGING = [(0, 0), (1, 0), (1, 1), (2, 1), (2, 2)]

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from hapticd.telemetry import wire
 from hapticd.telemetry.wire import Map, Topic
+from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.event import EventCode, LoopEvent
-from hapticd.tick.record import RecordLayout, TickRecord, WallRecord
+from hapticd.tick.record import RecordLayout, TickRecord
 from tests.telemetry.sockets import ticks
 
 ARRAYS = {"position_m", "velocity_m_per_s", "force_n", "force_requested_n"}
