@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, bars, plot
+from hapticd.cli.watch.space import VIEW_ROWS, contact_lines, views
 from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Position, Status
 from hapticd.telemetry.records import LATE_EDGES_US, LATE_US, late_ticks
@@ -81,7 +82,10 @@ def one_line(known: ScreenState) -> str:
             )
         ]
     if known.damping:
-        parts += [f"damping {damping:.1f} N s/m" for damping in known.damping.damping_n_s_per_m]
+        walls = len(known.damping.damping_n_s_per_m) - len(status.object_name)
+        parts += [f"damping {damping:.1f} N s/m" for damping in known.damping.damping_n_s_per_m[:walls]]
+    if status.object_name:
+        parts += [line.plain.strip() for line in contact_lines(known.trail, status, _of_objects(known, status))]
     if known.energy:
         parts += [f"energy {si(known.energy.energy_j, 'J')}", f"generated {si(known.energy.generated_j, 'J')}"]
     return "  ".join(parts)
@@ -100,9 +104,20 @@ def si(value: float, unit: str) -> str:
 def _running(known: ScreenState, status: Status, endpoint: str, width: int, height: int, now_s: float) -> list[Text]:
     above = [_header(status, known, width, now_s), *_warnings(status), _loop(known, status, width), *_device(status)]
     above += _model(status, width)
-    middle = [*_walls(known, status, width), _energy(known, width)]
+    middle = [
+        *_walls(known, status, width),
+        *contact_lines(known.trail, status, _of_objects(known, status)),
+        _energy(known, width),
+    ]
     footer = _footer(status, endpoint, width)
     room = height - len(above) - len(middle) - 1
+    if status.object_name and room >= VIEW_ROWS + 6 and width >= _NARROW:
+        left, right = (
+            _box(title, Text(axes, style=_QUIET), rows, len(rows[0]) + 4)
+            for title, axes, rows in views(known.trail, width)
+        )
+        middle = [*_side_by_side(left, right), *middle]
+        room -= VIEW_ROWS + 2
     log_rows = 0 if room < 9 else min(12, 3 + max(0, (room - 12) // 3))
     plot_height = room - (log_rows + 2 if log_rows else 0)
     plots = _plots(known, status, width, plot_height)
@@ -254,10 +269,12 @@ def _coloured(titles: Sequence[str], unit: str) -> Text:
 
 def _walls(known: ScreenState, status: Status, width: int) -> list[Text]:
     damping = known.damping
+    if damping is not None and status.object_name and len(damping.damping_n_s_per_m) == len(status.object_name):
+        return []
     if damping is None or not damping.damping_n_s_per_m:
         return [Text(" no walls in the scene", style=_QUIET)] if damping else []
     lines = []
-    count = len(damping.damping_n_s_per_m)
+    count = len(damping.damping_n_s_per_m) - len(status.object_name)
     for index in range(min(count, _MOST_WALLS)):
         line = _quiet(" wall ").append(f"{index}", "bold")
         if index < len(status.wall_axis):
@@ -277,6 +294,11 @@ def _walls(known: ScreenState, status: Status, width: int) -> list[Text]:
     if count > _MOST_WALLS:
         lines[-1] = _spread(lines[-1], Text(f"+{count - _MOST_WALLS} walls ", style=_QUIET), width)
     return lines
+
+
+def _of_objects(known: ScreenState, status: Status) -> Sequence[float]:
+    """Damping of the law on each object, which stand behind the walls [N s/m]."""
+    return known.damping.damping_n_s_per_m[-len(status.object_name) :] if known.damping else ()
 
 
 def _energy(known: ScreenState, width: int) -> Text:

@@ -7,7 +7,8 @@ from collections import deque
 from collections.abc import Sequence
 
 from hapticd.cli.watch.plot import Trace
-from hapticd.client import Cycle, Damping, Energy, Event, Gap, Position, Record, Status
+from hapticd.cli.watch.space import Trail
+from hapticd.client import Cycle, Damping, Energy, Event, Gap, Position, Record, Status, Touch
 
 _HISTORY_S = 1.0  # between two bars of a wall's damping
 
@@ -21,6 +22,7 @@ class ScreenState:
         cycles, events: the latest ones, newest first.
         heard_s: when anything came last, on the caller's clock [s].
         lost: ticks that this viewer did not get.
+        trail: where a device with three axes was, and what it touches.
     """
 
     def __init__(self) -> None:
@@ -32,6 +34,7 @@ class ScreenState:
         self.events: deque[Event] = deque(maxlen=100)
         self.heard_s = -math.inf
         self.lost = 0
+        self.trail = Trail()
         self.positions = Trace(0)
         self.forces = Trace(0)
         self.dampings: list[deque[float]] = []
@@ -52,6 +55,8 @@ class ScreenState:
                     self._take_position(record)
                 case Energy():
                     self.energy = record
+                case Touch():
+                    self.trail.touch(record)
                 case Damping():
                     self._take_damping(record)
                 case Cycle():
@@ -72,6 +77,8 @@ class ScreenState:
         self.positions.add(position.timestamp, position.position_m)
         self.forces.add(position.timestamp, position.force_requested_n + position.force_n)
         self.position = position
+        if len(position.position_m) == 3:
+            self.trail.pass_by(position.timestamp, position.position_m, position.seq)
 
     def _take_damping(self, damping: Damping) -> None:
         self.damping = damping

@@ -11,7 +11,7 @@ from hapticd.shapes.pose import Vector
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.energy import EnergyLedger
 
-LEAST_M = 1e-12
+LEAST_M = 1e-15
 """A spring along the surface is never quite slack, so that a law may divide by its length [m]."""
 
 

@@ -1,0 +1,125 @@
+"""Objects that change under a hand: by a ramp, under their name, and their work in a book of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+from hapticd.errors import ConfigError
+from hapticd.tick.contact import RunningLaw
+from tests.tick.space import passing_fault
+from tests.tick.space.rig import INFO, Rig, apart, ball, config, table
+
+RAMP_TICKS = 50
+
+
+def pressed(scene: str = "", law: str = "energy-cycle") -> Rig:
+    return Rig(scene or ball(), law).start((0.0, 0.0, 0.031)).to((0.0, 0.0, 0.0292), 60)
+
+
+@pytest.mark.parametrize(
+    "after",
+    [
+        ball(stiffness=9000.0),
+        ball(stiffness=1000.0),
+        ball(position_m=(0.0, 0.0, -0.0004)),
+        ball(position_m=(0.003, 0.0, 0.0)),
+        ball(position_m=(0.2, 0.0, 0.0)),
+        ball(radius_m=0.0302),
+        ball(static_friction=0.5, dynamic_friction=0.4),
+        table("ball", "box", size_m=(0.06, 0.06, 0.0598)),
+        "",
+    ],
+    ids=["stiffer", "softer", "lower", "aside", "away", "larger", "rough", "a box", "gone"],
+)
+def test_no_force_jumps_when_an_object_changes(after: str) -> None:
+    rig = pressed()
+    before = rig.force
+    worst = 0.0
+    rig.switch(after)
+    for _ in range(2 * RAMP_TICKS):
+        last = rig.force
+        rig.go((0.0, 0.0, 0.0292))
+        worst = max(worst, apart(rig.force, last))
+    assert abs(before[2]) > 3.0
+    assert worst <= 2.0 * 12.0 / RAMP_TICKS
+    settled = Rig(after).start((0.0, 0.0, 0.05)).to((0.0, 0.0, 0.0292), 400).to((0.0, 0.0, 0.0292), 100)
+    if "position" not in after:  # a proxy that was carried aside has another history than one that came from above
+        assert apart(rig.force, settled.force) < 0.02
+    assert rig.unbalanced_j() < 1e-13
+
+
+def test_an_object_goes_on_under_its_name_wherever_it_stands_in_the_file() -> None:
+    rig = pressed(ball() + ball("other", position_m=(0.2, 0.0, 0.0)))
+    contact = rig.tick.solids[0]
+    law, cycle = contact.normal.law, contact.ledger.energy_j
+    rig.switch(ball("other", position_m=(0.25, 0.0, 0.0)) + ball(stiffness=7000.0))
+    assert rig.tick.solids[1] is contact
+    assert contact.normal.law is law
+    assert contact.ledger.energy_j == cycle
+    assert contact.solid.index == 1
+
+
+def test_work_of_a_change_is_the_scenes_and_no_leak() -> None:
+    rig = pressed(law="none").to((0.0, 0.0, 0.0292), 5)
+    generated = rig.totals.ledger.generated_j
+    rig.switch(ball(stiffness=10000.0)).to((0.0, 0.0, 0.0292), 100)
+    assert rig.totals.moved_j == pytest.approx(0.5 * 5000.0 * 0.0008**2)
+    assert rig.totals.ledger.generated_j == pytest.approx(generated)
+    assert rig.totals.ledger.stored_j == pytest.approx(0.5 * 10000.0 * 0.0008**2)
+    assert rig.unbalanced_j() < 1e-14
+
+
+def test_a_switch_that_is_refused_changes_nothing() -> None:
+    rig = pressed()
+    solids, force = list(rig.tick.solids), rig.force
+    with pytest.raises(ConfigError, match="rounding_m"):
+        rig.switch(table("ball", "box", size_m=(0.01, 0.01, 0.01), rounding_m=0.02))
+    assert rig.tick.solids == solids
+    rig.go((0.0, 0.0, 0.0292))
+    assert apart(rig.force, force) < 0.2
+
+
+def test_another_law_comes_in_by_a_ramp_on_every_direction() -> None:
+    rig = pressed(ball(static_friction=0.8, dynamic_friction=0.6))
+    rig.switch(ball(static_friction=0.8, dynamic_friction=0.6), law="damper")
+    names = {channel.law.module.__name__ for channel in rig.tick.solids[0].channels}
+    assert names == {"hapticd_controllers.damper"}
+    assert len(rig.tick.solids[0].channels) == 3
+
+
+def test_a_law_that_fails_on_an_object_is_replaced_and_the_force_let_out() -> None:
+    rig = pressed()
+    loaded = config(ball())
+    contact = rig.tick.solids[0]
+    contact.normal.law = RunningLaw(passing_fault, passing_fault.Params())
+    rig.go((0.0, 0.0, 0.0291))
+    assert rig.tick.fallback
+    assert "passing_fault" in rig.tick.fault_text
+    assert rig.force[2] > 3.0
+    rig.to((0.0, 0.0, 0.0291), 60)
+    assert rig.force == (0.0, 0.0, 0.0)
+    assert loaded.law is not contact.normal.law.module
+
+
+def test_a_turned_normal_makes_a_law_forget_the_mass_of_its_direction() -> None:
+    rig = pressed()
+    contact = rig.tick.solids[0]
+    contact.normal.law.state.felt_mass_kg = 2.0
+    contact.normal.law.state.damping_n_s_per_m = contact.normal.damping_n_s_per_m = 700.0
+    for n in range(1, 101):  # 19 degrees about y
+        a = n * 0.0033
+        rig.go((0.0292 * math.sin(a), 0.0, 0.0292 * math.cos(a)))
+    assert contact.normal.law.state.felt_mass_kg == 2.0
+    rig.go((0.0292 * math.sin(0.4), 0.0, 0.0292 * math.cos(0.4)))
+    assert contact.normal.law.state.felt_mass_kg == 0.0
+    assert contact.normal.damping_n_s_per_m == 50.0  # its own bound while it knows no mass
+
+
+def test_an_object_that_swallows_the_start_is_refused_before_any_force() -> None:
+    info = dataclasses.replace(INFO, start_m=(0.0, 0.0, 0.029))
+    with pytest.raises(ConfigError) as refused:
+        Rig(ball(), info=info)
+    assert str(refused.value) == 'bench: scene.objects[0] "ball": swallows the device, which starts 1 mm inside it'

@@ -1,0 +1,83 @@
+"""What a scene costs, in counted instructions of the interpreter: ratios to one wall on the same device."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import textwrap
+from functools import partial
+from typing import Any
+
+import pytest
+
+from hapticd.offline.operations import count_operations, operations_by_code
+from hapticd.tick.space.tick import SpaceTick
+from hapticd.tick.tick import ControlTick
+from tests.tick.space.rig import Rig, ball
+
+WALL = '[[scene.walls]]\naxis = "z"\nposition_m = 0.03\nstiffness_n_per_m = 5000.0\n'
+ROUGH: dict[str, Any] = {"static_friction": 0.6, "dynamic_friction": 0.5}
+FAR = [ball(f"far {n}", radius_m=0.005, position_m=(0.1 + 0.02 * (n % 8), 0.1, 0.02 * (n // 8))) for n in range(63)]
+
+
+def per_tick(scene: str, law: str = "energy-cycle") -> float:
+    """Instructions of a tick that is pressed, on the mean, step alone: what a tick has besides is the same for all."""
+    rig = Rig(scene, law).start((0.0, 0.0, 0.031))
+    points = [(1e-4 * math.sin(0.1 * n), 0.0, 0.0295 + 6e-4 * math.cos(0.2 * n)) for n in range(263)]
+    rig.go(*points[:200])
+    counts = []
+    for at in points[200:]:
+        rig.sample.position_m[:] = at
+        rig.sample.time_ns += 1_000_000
+        count = count_operations(partial(rig.tick.advance, rig.sample, 1e-3))
+        if any(rig.tick.force_n):
+            counts.append(count)
+    assert len(counts) > 40
+    return sum(counts) / len(counts)
+
+
+@pytest.fixture(scope="module")
+def wall() -> float:
+    return per_tick(WALL)
+
+
+def test_a_scene_of_walls_runs_no_line_of_objects() -> None:
+    rig = Rig(WALL).start((0.0, 0.0, 0.031)).to((0.0, 0.0, 0.0299), 20)
+    run = operations_by_code(partial(rig.tick.advance, rig.sample, 1e-3))
+    assert not [code.co_qualname for code in run if "space" in code.co_filename or "shapes" in code.co_filename]
+
+
+def test_a_ball_costs_at_most_1_6_walls(wall: float) -> None:
+    assert per_tick(ball()) <= 1.6 * wall
+    assert per_tick(ball(), "none") <= 1.6 * per_tick(WALL, "none")
+
+
+def test_of_64_objects_those_that_are_not_touched_cost_nothing() -> None:
+    assert per_tick(ball() + "".join(FAR)) <= 2.0 * per_tick(ball())
+
+
+def test_eight_objects_with_friction_cost_at_most_five_walls(wall: float) -> None:
+    rough = [
+        each.replace("stiffness", "static_friction = 0.6\ndynamic_friction = 0.5\nstiffness", 1) for each in FAR[:7]
+    ]
+    assert per_tick(ball(**ROUGH) + "".join(rough)) <= 5.0 * wall
+
+
+def test_a_switch_to_walls_and_back_takes_the_short_tick_and_the_long_one() -> None:
+    rig = Rig(WALL).start((0.0, 0.0, 0.031))
+    assert rig.tick.advance == rig.tick.step
+    rig.switch(WALL + ball())
+    assert rig.tick.advance == rig.tick.step_in_space
+
+
+def test_both_steps_begin_alike() -> None:
+    """The sample, its faults and the blind ramps: written twice, since a call would cost the scene of walls."""
+
+    def head(function: object) -> list[str]:
+        body = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0].body  # type: ignore[arg-type,attr-defined]  # a method
+        lines = [ast.unparse(each) for each in body[1:]]
+        return lines[: lines.index("dt_s = motion.dt_s") + 1]
+
+    assert head(ControlTick.step) == head(SpaceTick.step_in_space)
+    assert len(head(ControlTick.step)) > 10
