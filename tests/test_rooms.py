@@ -26,7 +26,7 @@ PACKAGES = {
 SOURCES = {name: sorted(folder.rglob("*.py")) for name, folder in PACKAGES.items()}
 
 LONGEST_CHAIN = 14  # objects in space put two modules between assembling a tick and its contacts
-MOST_LINES = 26_000  # raised on purpose only, with what is new
+MOST_LINES = 28_000  # raised on purpose only, with what is new
 MOST_LINES_OF_A_MODULE = 400
 LARGEST_ROOM = 0.15
 

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from hapticd import plugins
 from hapticd.config.file import read
 from hapticd.config.models import Config, ControllerConfig, DeviceConfig
+from hapticd.config.objects import MeshObject
 from hapticd.config.problems import Problems, nearest
 from hapticd.config.values import with_values
 from hapticd.driver import Driver, DriverOptions
@@ -118,7 +119,7 @@ def parse(text: str, name: str) -> LoadedConfig:
                 problems.add(("device", "options"), str(error))
     if problems.lines or config is None or driver is None or options is None or law is None or params is None:
         raise ConfigError(*problems.lines)
-    return LoadedConfig(config, driver, options, law, params, Path(name), text)
+    return LoadedConfig(_with_files(config, Path(name).parent), driver, options, law, params, Path(name), text)
 
 
 def _toml(text: str, name: str) -> dict[str, Any]:
@@ -195,6 +196,17 @@ def _plugin(
         missing = isinstance(error.__cause__, ModuleNotFoundError)
         problems.add(key, f"{error}{_MAKE_IMPORTABLE if missing else ''}", name)
         return None
+
+
+def _with_files(config: Config, folder: Path) -> Config:
+    """The same with the whole path of each file of the scene, which lies beside the configuration."""
+    if not any(isinstance(each, MeshObject) for each in config.scene.objects):
+        return config
+    objects = tuple(
+        each.model_copy(update={"file": str((folder / each.file).resolve())}) if isinstance(each, MeshObject) else each
+        for each in config.scene.objects
+    )
+    return config.model_copy(update={"scene": config.scene.model_copy(update={"objects": objects})})
 
 
 def _check_together(problems: Problems, config: Config) -> None:

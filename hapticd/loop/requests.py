@@ -6,13 +6,15 @@ A new law or scene is built a slice a tick, in the time left before the next dea
 from __future__ import annotations
 
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from functools import partial
+from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
 from hapticd import plugins
 from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
-from hapticd.config.objects import OBJECT
+from hapticd.config.objects import OBJECT, MeshObject
 from hapticd.driver import DriverState
 from hapticd.errors import HapticdError
 from hapticd.loop.memory import DISARM, DISARMED_SINCE
@@ -21,6 +23,7 @@ from hapticd.loop.worker import Worker
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
+from hapticd.tick.space.solid import field_of
 
 _SWITCH_INTERVAL_S = 5e-5
 """How soon an import that runs beside the loop gives the interpreter back to it [s]."""
@@ -151,6 +154,9 @@ class RequestHandler:
             yield
         new_scene = SceneConfig.model_validate({**scene, "walls": walls, "objects": objects})
         yield
+        for each in objects:
+            if isinstance(each, MeshObject):
+                yield from self._beside(partial(field_of, Path(each.file)))
         yield from tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
         session.shared.layout.serve(tick)
         session.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
@@ -164,11 +170,23 @@ class RequestHandler:
 
         What holds the interpreter for longer makes them later, as the compiler does for a large law without bytecode.
         """
+
+        def load() -> None:
+            self._laws[name] = plugins.law(name)
+
+        yield from self._beside(load)
+
+    def _beside(self, work: Callable[[], object]) -> Generator[None, None, None]:
+        """Do what takes long beside the loop.
+
+        Raises:
+            HapticdError: what the work raised.
+        """
         ended: list[Exception | None] = []
 
         def load() -> None:
             try:
-                self._laws[name] = plugins.law(name)
+                work()
                 ended.append(None)
             except HapticdError as error:
                 ended.append(error)

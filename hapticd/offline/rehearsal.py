@@ -206,7 +206,7 @@ def rehearse(
         ticks=collected.ticks,
         left_place_tick=collected.left_place_tick,
         peak_force_n=collected.peak_n,
-        stiffness_n_per_m=contacts[0].wall.stiffness_n_per_m if contacts else math.nan,
+        stiffness_n_per_m=contacts[0].wall.stiffness_n_per_m if contacts else _stiffness_n_per_m(rehearsal.tick),
         generated_j=sum([ledger.generated_j for ledger in _ledgers(rehearsal.tick)]),
         dissipated_j=sum([ledger.dissipated_j for ledger in _ledgers(rehearsal.tick)]),
         fault=rehearsal.fault,
@@ -278,6 +278,12 @@ def _touched(tick: ControlTick) -> list[SolidContact]:
     if not isinstance(tick, SpaceTick):
         return []
     return [contact for contact in tick.solids if contact.in_contact]
+
+
+def _stiffness_n_per_m(tick: ControlTick) -> float:
+    """Of the first object; NaN without one [N/m]."""
+    solids = tick.solids if isinstance(tick, SpaceTick) else []
+    return solids[0].solid.stiffness_n_per_m if solids else math.nan
 
 
 def _ledgers(tick: ControlTick) -> list[EnergyLedger]:

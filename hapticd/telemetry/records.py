@@ -1,4 +1,7 @@
-"""What a daemon publishes, a class a topic: a key of the message is a field here."""
+"""What a daemon publishes, a class a topic: a key of the message is a field here.
+
+The whole wire stands in one module, to be read beside docs/telemetry.md.
+"""
 
 from __future__ import annotations
 

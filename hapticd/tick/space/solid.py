@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from hapticd.config.objects import BoxObject, CapsuleObject, CylinderObject, MeshObject, ObjectConfig, SphereObject
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
+from hapticd.shapes.field import Field
 from hapticd.shapes.pose import Pose
 from hapticd.shapes.solid import Placed, Proxy, group
 
@@ -115,10 +118,33 @@ def placed(config: ObjectConfig) -> Placed:
         case CylinderObject():
             keys |= {"radius_m": config.radius_m, "length_m": config.length_m, "rounding_m": config.rounding_m}
         case MeshObject():
-            raise ConfigError(f"file = {config.file}: meshes cannot be read yet")
+            keys |= {"field": field_of(Path(config.file))}
         case _:
             pass
     return Placed(config.shape, **keys)
+
+
+def field_of(file: Path) -> Field:
+    """The distance field of a mesh; read once for as long as the file does not change.
+
+    Raises:
+        ConfigError: it cannot be read, or is none.
+    """
+    try:
+        seen = file.stat()
+    except OSError as error:
+        raise ConfigError(f"file = {file}: {error.strerror}; `hapticd mesh` makes it from an STL or OBJ file") from None
+    return _field(file, seen.st_mtime_ns, seen.st_size)
+
+
+@lru_cache(maxsize=64)
+def _field(file: Path, _changed_ns: int, _size: int) -> Field:
+    try:
+        return Field.unpack(file.read_bytes())
+    except OSError as error:
+        raise ConfigError(f"file = {file}: {error.strerror}") from None
+    except ConfigError as error:
+        raise ConfigError(f"file = {file}: {error}") from None
 
 
 def compile_objects(objects: Sequence[ObjectConfig], info: DeviceInfo, period_s: float) -> list[Solid]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from array import array
 from collections.abc import Iterable
 from typing import Any
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.device import DeviceInfo, Sample
+from hapticd.shapes.field import Field
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.space.books import Totals
 from hapticd.tick.space.tick import SpaceTick
@@ -37,6 +40,16 @@ def table(name: str, shape: str, stiffness: float = 5000.0, **keys: Any) -> str:
 
 def ball(name: str = "ball", stiffness: float = 5000.0, **keys: Any) -> str:
     return table(name, "sphere", stiffness, **{"radius_m": 0.03, **keys})
+
+
+def ball_field(radius_m: float, spacing_m: float) -> Field:
+    """The distance field of a ball about the origin, as `hapticd mesh` would write it."""
+    count = 2 * math.ceil((radius_m + 4.0 * spacing_m) / spacing_m) + 1
+    edge_m = (count // 2) * spacing_m
+    at = [n * spacing_m - edge_m for n in range(count)]
+    values = array("f", [math.hypot(x, y, z) - radius_m for x in at for y in at for z in at])
+    error_m = spacing_m * spacing_m / (4.0 * radius_m)
+    return Field((count,) * 3, (-edge_m,) * 3, spacing_m, edge_m - radius_m, error_m, values)
 
 
 def config(scene: str, law: str = "energy-cycle", safety: str = "") -> LoadedConfig:

@@ -7,6 +7,7 @@ import inspect
 import math
 import textwrap
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ import pytest
 from hapticd.offline.operations import count_operations, operations_by_code
 from hapticd.tick.space.tick import SpaceTick
 from hapticd.tick.tick import ControlTick
-from tests.tick.space.rig import Rig, ball
+from tests.tick.space.rig import Rig, ball, ball_field, table
 
 WALL = '[[scene.walls]]\naxis = "z"\nposition_m = 0.03\nstiffness_n_per_m = 5000.0\n'
 ROUGH: dict[str, Any] = {"static_friction": 0.6, "dynamic_friction": 0.5}
@@ -51,6 +52,12 @@ def test_a_scene_of_walls_runs_no_line_of_objects() -> None:
 def test_a_ball_costs_at_most_1_6_walls(wall: float) -> None:
     assert per_tick(ball()) <= 1.6 * wall
     assert per_tick(ball(), "none") <= 1.6 * per_tick(WALL, "none")
+
+
+def test_a_mesh_costs_at_most_2_5_walls(wall: float, tmp_path: Path) -> None:
+    file = tmp_path / "ball.field"
+    file.write_bytes(ball_field(0.03, 0.00125).pack())
+    assert per_tick(table("mesh", "mesh", file=str(file))) <= 2.5 * wall
 
 
 def test_of_64_objects_those_that_are_not_touched_cost_nothing() -> None:
