@@ -17,6 +17,7 @@ from mcap.stream_reader import StreamReader
 
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.telemetry.records import Sent
+from hapticd.telemetry.wire import Topic
 from hapticd_views.recording import read
 from hapticd_views.recording.file import DiskError, RecordingFile
 from hapticd_views.recording.messages import TELEMETRY, schema_of
@@ -68,6 +69,10 @@ def test_the_official_reader_reads_it_and_every_message_keeps_to_its_schema(
         validators[schema.id].validate(json.loads(message.data))
     positions = [message for _, channel, message in messages if channel.topic == "hapticd/position"]
     assert [message.log_time for message in positions[:2]] == [1_700_000_000_000_000_000, 1_700_000_000_000_999_936]
+
+
+def test_every_topic_is_recorded() -> None:
+    assert {record.topic for record in TELEMETRY} == set(Topic)
 
 
 @pytest.mark.parametrize("record", TELEMETRY)

@@ -12,11 +12,11 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Any
+from typing import Any, get_args
 
-from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Sent, Status, Timing
+from hapticd.telemetry.records import Event, Gap, Sent
 
-TELEMETRY: tuple[type[Sent], ...] = (Position, Energy, Damping, Timing, Cycle, Input, Event, Status)
+TELEMETRY: tuple[type[Sent], ...] = get_args(Sent)
 """The records of telemetry that are recorded."""
 
 GAP = "recording/gap"
