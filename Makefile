@@ -22,7 +22,7 @@ DESTDIR ?=
 # Where units, rules, completions and the manual lie below: /usr for a package.
 SERVICE_PREFIX ?= /usr/local
 # What the service can do beyond the core, of little size.
-SERVICE_EXTRAS := metrics
+SERVICE_EXTRAS := metrics,dashboard
 PLACE = $(DESTDIR)$(PREFIX)
 
 .DEFAULT_GOAL := help
@@ -93,7 +93,7 @@ uninstall: own-place
 	test ! -x "$(PLACE)/bin/python" || "$(PLACE)/bin/python" -P -m hapticd service uninstall --root "$(DESTDIR)/" --prefix "$(SERVICE_PREFIX)"
 	rm -rf "$(PLACE)"
 
-deb:
+deb: web
 	deb/build
 
 own-place:

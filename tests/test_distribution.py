@@ -18,7 +18,7 @@ from packaging.utils import canonicalize_name
 from hapticd.version import __version__
 
 ROOT = Path(__file__).parent.parent
-SERVICE_EXTRA = "metrics"
+SERVICE_EXTRAS = ("metrics", "dashboard")
 
 
 def build(folder: Path, source: Path, kind: str) -> Path:
@@ -128,8 +128,8 @@ def needed(name: str, extra: str = "", found: set[str] | None = None) -> set[str
 
 
 def test_the_versions_of_all_that_the_service_needs_are_written_down() -> None:
-    assert set(pinned()) == needed("hapticd", SERVICE_EXTRA)
-    assert f"SERVICE_EXTRAS := {SERVICE_EXTRA}\n" in (ROOT / "Makefile").read_text()
+    assert set(pinned()) == set().union(*(needed("hapticd", extra) for extra in SERVICE_EXTRAS))
+    assert f"SERVICE_EXTRAS := {','.join(SERVICE_EXTRAS)}\n" in (ROOT / "Makefile").read_text()
 
 
 def test_these_tests_run_with_those_versions() -> None:

@@ -71,6 +71,11 @@ def test_what_it_says_of_itself(built: Built) -> None:
     assert built.said("dpkg-deb", "--info", built.package, "conffiles").split() == [CONFIG]
 
 
+def test_it_has_the_page_of_the_dashboard_with_the_licence_of_its_plots(built: Built) -> None:
+    (plots,) = [path for path in entries(built) if path.endswith("/page/vendor/uPlot.esm.js")]
+    assert plots.replace("esm.js", "LICENSE") in entries(built)
+
+
 def test_its_files_are_where_those_of_a_package_are_and_belong_to_root(built: Built) -> None:
     found = entries(built)
     places = ("/opt/hapticd/", "/usr/lib/", "/usr/share/", "/usr/bin/", "/etc/hapticd/")

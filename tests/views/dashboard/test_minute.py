@@ -165,3 +165,23 @@ def test_lost_ticks_are_counted_and_a_restart_is_not_a_loss(browser: Browser, st
         stage.play(records)
         page.wait_inside("page.store.lastSeq === 99")
         assert page.inside("page.store.punctuality().lost") == before + 7
+
+
+def test_a_device_of_three_axes_has_a_curve_and_a_figure_for_each(
+    browser: Browser, stage: Stage, served: Served
+) -> None:
+    """It takes the place of the one before, whose past it does not have."""
+    records = still(500, 1000)
+    for record in records:
+        record.deadline_ns += 100_000_000_000
+        for name in ("position_m", "velocity_m_per_s", "force_n", "force_requested_n"):
+            setattr(record, name, (0.001, 0.002, 0.003))
+    with browser.page(served.watch) as page:
+        stage.play(records)
+        has_come(page, 1499)
+        page.wait_inside("page.store.ring.axes === 3 && page.charts.list[0].figures.length === 3")
+        page.wait_inside("page.charts.list[0].uplot.data.length === 4")
+        figures = page.inside("page.charts.list[0].figures.map(({ output }) => output.textContent)")
+        assert figures == ["1.000", "2.000", "3.000"]
+        assert page.inside("page.charts.list[1].uplot.data.length") == 1 + 2 * 3
+        assert not page.events("Runtime.exceptionThrown")
