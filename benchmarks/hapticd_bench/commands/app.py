@@ -19,7 +19,7 @@ app = lazy_group(
         ),
         "viewers": (
             f"{_COMMANDS}.viewers:viewers",
-            "Measure what recorders, a dashboard and 14 subscribers cost, and whether any misses a tick.",
+            "Measure what two recorders, a dashboard with a page and 14 subscribers cost, and whether any misses a tick.",
         ),
         "batch": (
             f"{_COMMANDS}.batch:batch",

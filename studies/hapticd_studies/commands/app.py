@@ -30,12 +30,12 @@ app = lazy_group(
         ),
         "devices": (
             f"{_COMMANDS}.devices:command",
-            "Hold the device model against limits that others have published.",
+            "Hold the device model against limits and orders that others have published.",
         ),
         "scene": (f"{_COMMANDS}.scene:command", "Find the smallest model that keeps every answer of a scene."),
         "space": (
             f"{_COMMANDS}.space:command",
-            "Find what stiffness a device in space holds, by direction and place.",
+            "Find what stiffness a device with three axes holds, by direction and place.",
         ),
         "extremes": (
             f"{_COMMANDS}.extremes:command",
