@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -142,3 +143,48 @@ def test_a_device_that_stayed_for_a_minute_is_looked_for_as_if_for_the_first_tim
     lost.now_s += steady_s
     lost.made.begin(LOST, "unplugged again")
     assert lost.waits_s(2) == pytest.approx(waits_s, abs=0.02)
+
+
+def test_soon_after_the_computer_came_up_the_first_wait_is_as_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its clock shows less than a minute then."""
+    away = Lost(monkeypatch)
+    away.now_s = 5.0
+    away.made.begin(LOST, "unplugged")
+    assert away.waits_s(3) == pytest.approx([1.0, 2.0, 4.0], abs=0.02)
+    assert away.made.lost_s == 5.0
+    assert away.made.why == "not there"
+
+
+@pytest.mark.parametrize("stalled", [False, True])
+def test_nothing_is_tried_before_the_process_that_lost_it_has_ended(lost: Lost, stalled: bool) -> None:
+    """One that hangs in its driver is killed."""
+    killed: list[bool] = []
+    ending: Any = SimpleNamespace(exit_code=None, stalled=lambda: stalled, kill=lambda: killed.append(True))
+    lost.now_s += 100.0
+    assert lost.made.turn(ending, NO_CONFIG) is None
+    assert lost.tries_s == []
+    assert killed == [True] * stalled
+
+
+def test_what_comes_is_news_once_and_what_goes_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The lists are looked at four times a second."""
+    clock = SimpleNamespace(now_s=0.0)
+    monkeypatch.setattr(recovery, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
+    monkeypatch.setattr(recovery, "PLACES", (tmp_path / "usb", tmp_path / "tty"))
+    (tmp_path / "usb").mkdir()  # there are no serial lines
+    (tmp_path / "usb" / "mouse").touch()
+    watch = recovery.HotplugWatch()
+    assert not watch.news()
+    (tmp_path / "usb" / "arm").touch()
+    assert not watch.news()  # too soon for a look
+    clock.now_s += 0.3
+    assert watch.news()
+    clock.now_s += 0.3
+    assert not watch.news()
+    (tmp_path / "usb" / "mouse").unlink()
+    clock.now_s += 0.3
+    assert not watch.news()
+    (tmp_path / "usb" / "arm").unlink()
+    (tmp_path / "usb" / "other").touch()
+    clock.now_s += 0.3
+    assert watch.news()

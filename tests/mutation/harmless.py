@@ -10,9 +10,16 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "[Gt 0 is GtE]",
         "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 1 is Lt]",
     ),
+    "a longer frame is no intact message either, and less than a microsecond is none": (
+        "drivers/hapticd_drivers/rig/frames.py: _decoded: if len(frame) > LONGEST_FRAME:  [without return None]",
+        "drivers/hapticd_drivers/rig/conversation.py: Conversation.await_state: if left_ns <= 0:  [0 is 1]",
+    ),
     "it is set before it is read": (
         "hapticd/tick/energy.py: EnergyLedger.__init__: self.window_minimum_j = 0.0  [0.0 is 1.0]",
         "hapticd/tick/energy.py: EnergyLedger.__init__: def __init__  [without self.window_minimum_j = 0.0]",
+        "hapticd/supervisor/recovery.py: Recovery.__init__: def __init__  [without self.lost_s = 0.0]",
+        "hapticd/supervisor/recovery.py: Recovery.__init__: def __init__  [without self._arrivals = HotplugWatch()]",
+        "hapticd/tick/contact.py: Contact.__init__: self.force_n = 0.0  [0.0 is 1.0]",
         "hapticd/tick/velocity.py: LowPass.__init__: def __init__  [without self._weight = 0.0]",
     ),
 }
