@@ -233,3 +233,38 @@ def test_where_counts_are_coarse_eight_of_them_tell_the_sign() -> None:
     with pytest.raises(DeviceFaultError, match="does not move"):
         motion.check_sign(coarse)
     motion.check_sign(replace(drive_of(Drifting(1.8e-6, -1.8e-6)), count_m=1e-4))
+
+
+def test_a_handle_is_at_rest_when_it_has_not_moved_for_a_tenth_of_a_second() -> None:
+    still = Handle()
+    motion.here(drive_of(still))
+    assert still.time_s == pytest.approx(motion.REST_S, abs=3e-3)
+    assert motion.REST_S == 0.1
+    rolling = Handle()
+    rolling.speed_m_per_s = 0.3
+    count = motion.here(drive_of(rolling))
+    assert rolling.speed_m_per_s == 0.0
+    assert count == round(rolling.position_m / COUNT_M)
+    assert rolling.time_s > 0.15
+
+
+def test_a_handle_that_never_rests_is_told_after_three_seconds() -> None:
+    class Restless(Handle):
+        def push(self, axis: int, force_n: float) -> Moment:
+            self.position_m = 1e-3 * math.sin(30.0 * self.time_s)
+            self.time_s += 1e-3
+            return Moment(self.time_s, self.position_m, round(self.position_m / COUNT_M), False)
+
+    handle = Restless()
+    with pytest.raises(DeviceFaultError, match="does not come to rest"):
+        motion.here(drive_of(handle))
+    assert handle.time_s == pytest.approx(3.0, abs=0.01)
+
+
+def test_a_handle_that_creeps_for_ever_is_given_up_in_time() -> None:
+    """Twice the time of the longest way at the speed of the drive, and 5 s."""
+    handle = Drifting(1e-7, -1e-7)
+    with pytest.raises(DeviceFaultError, match="got nowhere within 17 s"):
+        motion.find_switch(drive_of(handle), 1.0)
+    assert handle.time_s == pytest.approx(2.0 * (1.5 * 0.08 + motion.LAG_M) / 0.02 + 5.0, abs=0.02)
+    assert handle.forces_n[-1] == 0.0
