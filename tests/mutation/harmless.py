@@ -8,6 +8,12 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 1 is Lt]",
         "hapticd/tick/guard.py: blended: weight: float = done / state.blend_ticks if done > 0.0 else 0.0  "
         "[Gt 0 is GtE]",
+        "controllers/hapticd_controllers/tdpa.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/tdpa.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
+        "controllers/hapticd_controllers/energy_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/energy_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
+        "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
         "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 1 is Lt]",
     ),
     "a longer frame is no intact message either, and less than a microsecond is none": (
