@@ -19,7 +19,7 @@ app = lazy_group(
         ),
         "viewers": (
             f"{_COMMANDS}.viewers:viewers",
-            "Measure what two recorders, a dashboard with a page and 14 subscribers cost, and whether any misses a tick.",
+            "Measure what two recorders, a dashboard with a page and 14 subscribers cost.",
         ),
         "batch": (
             f"{_COMMANDS}.batch:batch",

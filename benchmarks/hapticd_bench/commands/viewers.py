@@ -22,7 +22,9 @@ def viewers(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Measure what two recorders, a dashboard with a page and 14 subscribers cost, and whether any misses a tick.
+    """Measure what two recorders, a dashboard with a page and 14 subscribers cost.
+
+    And whether any of them misses a tick.
 
     One daemon, in turns with and without them.
 
