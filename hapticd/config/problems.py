@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 import types
@@ -87,6 +86,8 @@ class Problems:
 
 def nearest(name: str, known: Sequence[str]) -> str:
     """Advice for an unknown name: the nearest known one, or all of them."""
+    import difflib  # for an error only
+
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
     if near:
         return f'did you mean "{near[0]}"?'

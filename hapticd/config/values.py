@@ -8,8 +8,6 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-import tomlkit
-
 from hapticd.config.models import ControllerConfig, DeviceConfig
 from hapticd.config.problems import shown_value
 from hapticd.errors import ConfigError
@@ -36,6 +34,8 @@ def with_values(text: str, name: str, values: Mapping[str, Any]) -> str:
     Raises:
         ConfigError: a key that is none or has no place, or a value that TOML cannot hold.
     """
+    import tomlkit  # nothing that runs needs it, and it takes long to import
+
     data = tomllib.loads(text.removeprefix("\ufeff") + "\n")
     for key in sorted(values, key=lambda key: key not in _PLUGINS):
         if key in _PLUGINS:
@@ -61,6 +61,8 @@ def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
     Raises:
         ConfigError: it is no key, it has no place, or the value is none that TOML can hold.
     """
+    import tomlkit
+
     if not _KEY.fullmatch(key):
         raise ConfigError(f"{name}: {shown_value(key)}: must be a key such as scene.walls[0].stiffness_n_per_m")
     steps: list[str | int] = [

@@ -48,6 +48,9 @@ HISTORY_S = 8.0
 DISARMED_SINCE = "not done: disarming was asked for after it"
 """The answer to a request that would put forces on after all, on either side of the memory."""
 
+GO = b"go"
+"""The packet that lets the loop's process open the device."""
+
 LARGEST_ANSWER = 1 << 16
 """Of the packet with which the loop's process says that it is ready, or why it is not [bytes]."""
 

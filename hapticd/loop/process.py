@@ -1,8 +1,8 @@
 """The process of the loop: what runs behind `python -m hapticd.loop.process`.
 
 The supervisor starts it with the configuration's text on its standard input and one end of a socket pair as its
-descriptor `--socket`. It answers with one packet: what it found and the descriptor of the shared memory, or why it
-cannot run.
+descriptor `--socket`. Over that it hears when to go on, once there is what takes a force away, and answers with one
+packet: what it found and the descriptor of the shared memory, or why it cannot run.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import socket
 import sys
 import time
 import traceback
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from types import ModuleType
 
 import msgpack
@@ -26,7 +26,7 @@ from hapticd.config.models import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory
+from hapticd.loop.memory import GO, SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
 from hapticd.loop.resume import ResumeState, identity
 from hapticd.loop.warm_up import warm_up
@@ -50,7 +50,13 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     channel = socket.socket(fileno=arguments.socket)
     try:
-        control = _prepare(channel, arguments.parent)
+        try:
+            asked = _asked()
+        finally:  # no force before there is what takes it away; and what is left unread here would undo a refusal
+            going = channel.recv(len(GO)) == GO
+        if not going:
+            return 1  # the supervisor is gone
+        control = _prepare(asked, channel, arguments.parent)
     except HapticdError as error:
         with contextlib.suppress(ConnectionError):
             refusal = {"error": str(error)[:_LONGEST_ERROR], "exit_code": error.exit_code}
@@ -69,16 +75,30 @@ def main() -> int:
     return 0
 
 
-def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What the loop is to run, with everything imported that it may need."""
+
+    config: LoadedConfig
+    accuracy: str
+    resume: ResumeState
+    laws: dict[str, ModuleType]
+
+
+def _asked() -> _Asked:
     request = msgpack.unpackb(sys.stdin.buffer.read(), unicode_errors="surrogateescape")
     if request.get("version") != __version__:
         raise HapticdError(
             f"hapticd {__version__} was installed while {request.get('version')} runs: restart the daemon"
         )
     config = parse(request["text"], request["name"])
-    resume = ResumeState(**request["resume"])
-    settings = config.config
     config, accuracy = _fitted(config)
+    return _Asked(config, accuracy, ResumeState(**request["resume"]), _installed_laws())
+
+
+def _prepare(asked: _Asked, channel: socket.socket, parent_pid: int) -> ControlLoop:
+    config, resume = asked.config, asked.resume
+    settings = config.config
     driver = config.driver(config.options, settings.loop.period_s)
     place_device(config, driver)
     info = driver.open()
@@ -99,7 +119,7 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
             sleep_until,
             resume,
         )
-        for name, law in _installed_laws().items():
+        for name, law in asked.laws.items():
             control.requests.know(name, law)
         control.requests.know(settings.controller.law, config.law)
         warm_up(make_tick(config, info))
@@ -112,7 +132,7 @@ def _prepare(channel: socket.socket, parent_pid: int) -> ControlLoop:
         problems, advice = become_realtime(settings.loop)
         shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
         hello = {"info": asdict(info), "realtime": not problems, "warnings": problems + advice, "pid": os.getpid()}
-        hello["accuracy"] = accuracy
+        hello["accuracy"] = asked.accuracy
         socket.send_fds(channel, [msgpack.packb(hello)], [shared.descriptor])
         channel.close()
     except BaseException:

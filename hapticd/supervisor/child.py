@@ -21,6 +21,7 @@ from hapticd.config.models import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.loop.memory import (
+    GO,
     LARGEST_ANSWER,
     RECORDS,
     SKIPPED,
@@ -171,9 +172,10 @@ class LoopStart:
     Args:
         config: what it is to run.
         resume: where the loop before stopped, when this one goes on for it.
+        wait: it gets ready, and does not touch the device before `go`.
     """
 
-    def __init__(self, config: LoadedConfig, resume: ResumeState = FROM_START) -> None:
+    def __init__(self, config: LoadedConfig, resume: ResumeState = FROM_START, *, wait: bool = False) -> None:
         self._config = config
         self._give_up_s = time.monotonic() + TIMEOUT_S
         wanted = {"version": version.__version__, "text": config.text, "name": str(config.path)}
@@ -194,6 +196,13 @@ class LoopStart:
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
             )
+        if not wait:
+            self.go()
+
+    def go(self) -> None:
+        """Let it open the device and run."""
+        with contextlib.suppress(ConnectionError):  # it has ended, and `poll` says why
+            self._channel.send(GO)
 
     def poll(self, timeout_s: float = 0.0) -> LoopProcess | None:
         """The running loop; None while it is not ready.
@@ -211,7 +220,10 @@ class LoopStart:
                 return None
             self.end()
             raise HapticdError(f"the device did not open within {TIMEOUT_S:g} s")
-        answer, descriptors, _, _ = socket.recv_fds(self._channel, LARGEST_ANSWER, 1)
+        try:
+            answer, descriptors, _, _ = socket.recv_fds(self._channel, LARGEST_ANSWER, 1)
+        except ConnectionError:  # it died before it was told to go on
+            answer, descriptors = b"", []
         if not descriptors:
             self.end()
             if not answer:

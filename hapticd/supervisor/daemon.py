@@ -79,8 +79,13 @@ class Daemon:
             undo.callback(self.lock.close)
             self.release = ForceRelease(config)
             undo.callback(self.release.close)
-            self.release.wait_ready()  # before there can be a force to take away; that it is not ready is said later
-            loop = LoopStart(config).wait()
+            start = LoopStart(config, wait=True)  # both import what they need at the same time
+            with contextlib.ExitStack() as on_the_way:
+                on_the_way.callback(start.end)
+                self.release.wait_ready()  # before there can be a force to take away; if it is not, that is said later
+                on_the_way.pop_all()
+            start.go()
+            loop = start.wait()
             starting = undo.enter_context(contextlib.ExitStack())
             starting.callback(self._end, loop)
             publisher = Publisher(config.config.telemetry, self.lock.directory / TELEMETRY, loop.info, offset_ns, ring)

@@ -1,4 +1,4 @@
-"""The helper that takes the force away stands by before there can be a force, or its absence is told."""
+"""The helper that takes the force away is ready before there can be a force, or its absence is told."""
 
 from __future__ import annotations
 
@@ -16,12 +16,28 @@ elif "hapticd.loop.process" in sys.orig_argv:
     Path(__file__).with_name("control").write_text(str(time.monotonic_ns()))
 """
 
+OPENED = """
+import time
+from pathlib import Path
+from hapticd_drivers.loopback import Loopback
+class Opened(Loopback):
+    def _open(self):
+        Path(__file__).with_name("opened").write_text(str(time.monotonic_ns()))
+        return super()._open()
+"""
 
-def test_no_control_process_is_started_before_the_helper_stands_by(tmp_path: Path) -> None:
-    late = 'time.sleep(1.5); Path(__file__).with_name("helper").write_text(str(time.monotonic_ns()))'
+
+def test_no_device_is_opened_before_the_helper_is_ready(tmp_path: Path) -> None:
+    """The loop's process imports what it needs in the meantime, and waits."""
+    late = 'time.sleep(3.0); Path(__file__).with_name("helper").write_text(str(time.monotonic_ns()))'
     (tmp_path / "sitecustomize.py").write_text(WITNESS.replace("HELPER", late))
-    with Daemon(PRESSED, pythonpath=tmp_path).wait_ready():
-        assert int((tmp_path / "helper").read_text()) < int((tmp_path / "control").read_text())
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/__init__.py").touch()
+    (tmp_path / "lab/opened.py").write_text(OPENED)
+    with Daemon('[device]\ndriver = "lab.opened"\n', pythonpath=tmp_path).wait_ready():
+        began, helper, opened = (int((tmp_path / name).read_text()) for name in ("control", "helper", "lab/opened"))
+    assert helper < opened
+    assert began < helper, "both start at the same time, or this shows nothing"
 
 
 def test_a_daemon_without_its_helper_runs_and_says_so(tmp_path: Path) -> None:

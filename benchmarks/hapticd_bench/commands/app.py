@@ -33,6 +33,10 @@ app = lazy_group(
             f"{_COMMANDS}.soak:soak",
             "Leave a daemon running and see whether anything grows, drifts or gets lost.",
         ),
+        "start": (
+            f"{_COMMANDS}.start:start",
+            "Measure how long `hapticd run` takes to its first tick, and what of it.",
+        ),
         "switch": (
             f"{_COMMANDS}.switch:switch",
             "Measure how long a switch to a law never loaded holds the loop up, at 1 kHz.",
