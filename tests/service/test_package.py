@@ -83,8 +83,13 @@ def test_its_files_are_where_those_of_a_package_are_and_belong_to_root(built: Bu
     assert [path for path in found if path not in parents and not path.startswith(places)] == []
     assert {owner for _, owner in found.values()} == {"root/root"}
     assert [path for path, (mode, _) in found.items() if "s" in mode or ("w" in mode[4:] and mode[0] != "l")] == []
-    for path in ("copyright", "changelog.gz"):
-        assert found[f"/usr/share/doc/hapticd/{path}"][0] == "-rw-r--r--"
+    shared = (
+        *("doc/hapticd/copyright", "doc/hapticd/changelog.gz", "man/man1/hapticd.1.gz"),
+        *("bash-completion/completions/hapticd", "zsh/vendor-completions/_hapticd"),
+        *("fish/vendor_completions.d/hapticd.fish", "hapticd/grafana-dashboard.json"),
+    )
+    for path in shared:
+        assert found[f"/usr/share/{path}"][0] == "-rw-r--r--"
     assert found["/usr/bin/hapticd"][0].startswith("l")
     sums = built.said("dpkg-deb", "--ctrl-tarfile", built.package)
     assert "md5sums" in sums
