@@ -24,9 +24,7 @@ def viewers(
 ) -> None:
     """Measure what two recorders, a dashboard with a page and 14 subscribers cost.
 
-    And whether any of them misses a tick.
-
-    One daemon, in turns with and without them.
+    One daemon, in turns with and without them; and whether any of them misses a tick.
 
     Example: hapticd bench viewers --duration 1200
     """
