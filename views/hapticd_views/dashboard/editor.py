@@ -17,7 +17,7 @@ from hapticd_views.dashboard.form import form
 from hapticd_views.dashboard.target import Target
 
 _PARAMS = "controller.params."
-_EDITABLE = re.compile(r"controller\.params\.\w+|safety\.\w+|scene\.walls\[\d\]\.\w+")
+_EDITABLE = re.compile(r"controller\.params\.\w+|safety\.\w+|scene\.(walls|objects)\[\d{1,2}\]\.\w+")
 
 Values = dict[str, bool | int | float | str | None]
 

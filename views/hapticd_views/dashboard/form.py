@@ -12,7 +12,7 @@ from pydantic_core import PydanticUndefined
 
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig
-from hapticd.config.models import SafetyConfig, WallConfig
+from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
 from hapticd.config.problems import allowed_range, unit_of
 from hapticd.errors import PluginError
 
@@ -32,7 +32,8 @@ def form(loaded: LoadedConfig) -> dict[str, Any]:
         loaded: it.
 
     Returns:
-        `law`, its name; `laws`, each with `name`, `summary` and `fields`; `walls`, the fields of each; `limits`, too.
+        `law`, its name; `laws`, each with `name`, `summary` and `fields`; `scene`, walls and objects, each with `title`
+        and `fields`; `limits`, fields.
         A field has `key`, `name`, `unit`, `meaning`, `allowed`, `kind` (number, whole, flag, choice or text),
         `choices`, `optional` and `value`, which is None when it is not set.
     """
@@ -43,12 +44,18 @@ def form(loaded: LoadedConfig) -> dict[str, Any]:
     return {
         "law": now,
         "laws": [*_laws(names, loaded)],
-        "walls": [
-            _fields(WallConfig, WALL, f"scene.walls[{index}]", wall)
-            for index, wall in enumerate(loaded.config.scene.walls)
-        ],
+        "scene": [*_scene(loaded.config.scene)],
         "limits": _fields(SafetyConfig, LIMITS, "safety", loaded.config.safety),
     }
+
+
+def _scene(scene: SceneConfig) -> Iterator[dict[str, Any]]:
+    for index, wall in enumerate(scene.walls):
+        yield {"title": f"Wall {index + 1}", "fields": _fields(WallConfig, WALL, f"scene.walls[{index}]", wall)}
+    for index, each in enumerate(scene.objects):
+        fields = _fields(type(each), type(each).model_fields, f"scene.objects[{index}]", each)
+        title = f"{each.name} ({each.shape})"
+        yield {"title": title, "fields": [field for field in fields if field["kind"] in ("number", "flag")]}
 
 
 def _laws(names: Iterable[str], loaded: LoadedConfig) -> Iterator[dict[str, Any]]:
@@ -66,7 +73,8 @@ def _laws(names: Iterable[str], loaded: LoadedConfig) -> Iterator[dict[str, Any]
 
 
 def _fields(model: type[BaseModel], names: Iterable[str], table: str, values: BaseModel | None) -> list[Field]:
-    return [_field(model.model_fields[name], name, f"{table}.{name}", values) for name in names]
+    fields = (_field(model.model_fields[name], name, f"{table}.{name}", values) for name in names)
+    return [field for field in fields if field["kind"] != "array"]  # which take an editor
 
 
 def _field(info: FieldInfo, name: str, key: str, values: BaseModel | None) -> Field:
@@ -87,6 +95,8 @@ def _field(info: FieldInfo, name: str, key: str, values: BaseModel | None) -> Fi
 
 
 def _kind(annotation: Any) -> str:
+    if typing.get_origin(annotation) is tuple:
+        return "array"
     for kind, name in ((bool, "flag"), (str, "text"), (int, "whole"), (float, "number")):
         if annotation is kind or kind in typing.get_args(annotation):
             return name

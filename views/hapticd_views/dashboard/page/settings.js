@@ -89,18 +89,18 @@ export class Settings {
   }
 
   #build() {
-    const { laws, law, walls, limits } = this.form;
+    const { laws, law, scene, limits } = this.form;
     this.law = document.createElement("select");
     this.law.append(...laws.map(({ name }) => new Option(name, name)));
     this.law.value = law;
     this.law.disabled = !this.mayCommand;
     this.law.addEventListener("change", () => { this.#buildLaw(); this.#changed(); });
-    this.sceneFields = walls.flatMap((fields) => fields.map((spec) => this.#field(spec)));
+    this.sceneFields = scene.flatMap(({ fields }) => fields.map((spec) => this.#field(spec)));
     this.limitFields = limits.map((spec) => this.#field(spec));
     let next = 0;
-    this.get("page-scene").replaceChildren(...walls.flatMap((fields, index) => [
-      heading(`Wall ${index + 1}`), ...fields.map(() => this.sceneFields[next++].element)]));
-    if (!walls.length) this.get("page-scene").append(heading("No walls: free space"));
+    this.get("page-scene").replaceChildren(...scene.flatMap(({ title, fields }) => [
+      heading(title), ...fields.map(() => this.sceneFields[next++].element)]));
+    if (!scene.length) this.get("page-scene").append(heading("Nothing is there: free space"));
     this.get("page-limits").replaceChildren(...this.limitFields.map(({ element }) => element));
     this.#buildLaw();
     this.#changed();
