@@ -20,6 +20,7 @@ _LEAST_M2 = 1e-16
 _SLIDES = 10
 _LEAST_SHARE = 0.01
 _CREASE = 0.02
+_ONE_FACE = 0.98
 _LANDINGS = 3
 _WAY_OUT = 100
 _CONE = 1.02
@@ -62,6 +63,38 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
         vy = py - y
         vz = pz - z
         vv = vx * vx + vy * vy + vz * vz
+        turn = nx * mx + ny * my + nz * mz
+        if -_ONE_FACE < turn < _ONE_FACE:  # another face: where both meet, if the device is behind both
+            a = wx * nx + wy * ny + wz * nz
+            b = vx * mx + vy * my + vz * mz
+            both = 1.0 - turn * turn
+            first = (turn * b - a) / both
+            second = (turn * a - b) / both
+            if first > 0.0 and second > 0.0:
+                e, qx, qy, qz, ox, oy, oz = land(
+                    proxy,
+                    others,
+                    voxels,
+                    px + first * nx + second * mx,
+                    py + first * ny + second * my,
+                    pz + first * nz + second * mz,
+                )
+                tx = px - qx
+                ty = py - qy
+                tz = pz - qz
+                tt = tx * tx + ty * ty + tz * tz
+                if tt < vv and -SURFACE_M <= e <= SURFACE_M:
+                    d = e
+                    x = qx
+                    y = qy
+                    z = qz
+                    mx = ox
+                    my = oy
+                    mz = oz
+                    vx = tx
+                    vy = ty
+                    vz = tz
+                    vv = tt
         if vv < ww and -SURFACE_M <= d <= SURFACE_M:
             gained = ww - vv
             proxy.gx = x
