@@ -143,6 +143,10 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
             "self.x_m one later", "force_n one later",
         ),
     },
+    "the trace begins with the first tick; tests/simulation/test_batch.py has others": {
+        "run: traced = count - params.trace_from": ("Add in count - params.trace_from",),
+        "run: if traced >= 0 and (traced + 1) % params.trace_every == 0:": ("GtE 0 is Gt", "0 is 1"),
+    },
     "it only saves time": {
         "ControlTick.step: if x_m < 0.0 or contact.awake:": ("Lt 0 is LtE", "0.0 is 1.0"),
         "Contact.settle: touched = in_contact or self.applied_n != 0.0": ("0.0 is 1.0",),

@@ -238,6 +238,14 @@ def test_the_trace_keeps_one_tick_in_so_many() -> None:
     assert np.array_equal(thin[0], full[0, 6::7])
 
 
+@pytest.mark.parametrize("every", [1, 7])
+def test_a_trace_of_the_end_begins_where_it_is_told(every: int) -> None:
+    law = plugins.law("none")
+    full = Batch(law, [free(law, hand=pressed(-1.0))], 0.5, trace_every=1).run().trace
+    last = Batch(law, [free(law, hand=pressed(-1.0))], 0.5, trace_every=every, trace_last_s=0.1).run().trace
+    assert np.array_equal(last[0], full[0, 400 + every - 1 :: every])
+
+
 def test_a_loop_that_flies_apart_says_so_and_stops() -> None:
     law = plugins.law("none")
     result = Batch(law, [free(law, viscous_n_s_per_m=-200.0, hand=pressed(-1.0)), free(law)], 2.0).run()
