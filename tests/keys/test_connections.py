@@ -84,6 +84,17 @@ def test_the_oldest_that_say_nothing_are_dropped() -> None:
         assert not any(ended(one) for one in opened[MOST:])
 
 
+def test_who_was_heard_stays_and_the_next_oldest_goes() -> None:
+    """However many come later."""
+    with bounded() as (bound, _, where), sockets.create_connection(where) as first:
+        wait_until(lambda: any(bound._endpoints.values()), "news of the connection")
+        for descriptor in [descriptor for clients in bound._endpoints.values() for descriptor in clients]:
+            bound.heard(descriptor)
+        with sockets.create_connection(where) as second, flood(where, 2 * MOST) as opened:
+            wait_until(lambda: ended(second) and all(ended(one) for one in opened[:MOST]), "the end of the oldest")
+            assert not ended(first)
+
+
 def test_who_says_what_makes_no_sense_is_dropped_in_the_end_and_no_other() -> None:
     with bounded() as (bound, socket, where), zmq.Context() as context:
         odd, other = (context.socket(zmq.DEALER) for _ in range(2))
