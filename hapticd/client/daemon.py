@@ -23,6 +23,7 @@ def connect(
     keys: Path | str | None = None,
     topics: Sequence[type[Sent] | Topic | str] = tuple(Topic),
     timeout_s: float | None = None,
+    receive_high_water: int = 1000,
 ) -> DaemonClient:
     """Connect to a running daemon. When this returns, everything that happens next arrives.
 
@@ -33,6 +34,7 @@ def connect(
         keys: key file for a daemon on another computer; None: the one that $HAPTICD_KEYS names, if any.
         topics: record classes, or topics by name, to iterate over; all unless given.
         timeout_s: longest silence while iterating [s]; None: wait for ever.
+        receive_high_water: messages kept while the caller is busy; new ones are lost beyond it.
 
     Raises:
         ClientError: no such topic, or an endpoint that cannot be used.
@@ -42,7 +44,7 @@ def connect(
         SchemaError: the daemon's schema is not known to this client.
         SilenceError: no daemon answers there.
     """
-    return DaemonClient(instance, telemetry, control, keys, topics, timeout_s)
+    return DaemonClient(instance, telemetry, control, keys, topics, timeout_s, receive_high_water)
 
 
 class DaemonClient(Client):
@@ -62,10 +64,18 @@ class DaemonClient(Client):
         keys: Path | str | None,
         topics: Sequence[type[Sent] | Topic | str],
         timeout_s: float | None,
+        receive_high_water: int,
     ) -> None:
         if control is not None and telemetry is None:
             raise ClientError(f'{control}: name the same daemon\'s telemetry endpoint as well: telemetry="tcp://..."')
-        super().__init__(telemetry, instance=instance, topics=topics, timeout_s=timeout_s, keys=keys)
+        super().__init__(
+            telemetry,
+            instance=instance,
+            topics=topics,
+            timeout_s=timeout_s,
+            receive_high_water=receive_high_water,
+            keys=keys,
+        )
         self._instance = instance
         self._control = control
         self._keys = Path(keys) if keys is not None else None

@@ -48,7 +48,9 @@ kept = {"ticks": ([], []), "events": ([], [])}
 end = time.monotonic() + 60.0
 def enough():
     texts = [json.loads(text) for text, in kept["events"][0]]
-    return len(kept["ticks"][0]) >= TICKS and any(text["kind"] == "marker" for text in texts)
+    marked = [text["seq"] for text in texts if text["kind"] == "marker"]
+    ticks = kept["ticks"][0]
+    return len(ticks) >= TICKS and bool(marked) and ticks[-1][0] >= marked[0]
 while not enough() and time.monotonic() < end:
     for name, inlet in zip(("ticks", "events"), inlets):
         samples, times = inlet.pull_chunk(timeout=0.1)

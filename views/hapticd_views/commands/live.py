@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hapticd.client import connect as connected
 from hapticd.progress import progress_bar
+from hapticd_views.recording.recorder import MOST_UNREAD
 from hapticd_views.source import Source, listen
 
 
@@ -22,7 +23,7 @@ def heard(duration_s: float, instance: str, connect: str | None, control: str | 
     """
     began_s = time.monotonic()
     with (
-        connected(instance, telemetry=connect, control=control, keys=keys) as daemon,
+        connected(instance, telemetry=connect, control=control, keys=keys, receive_high_water=MOST_UNREAD) as daemon,
         progress_bar(round(duration_s), "listening") as tell,
     ):
 

@@ -70,12 +70,14 @@ def record(
     if context.invoked_subcommand is not None:
         return
     with _extra():
-        from hapticd_views.recording.recorder import Limits, Recorder
+        from hapticd_views.recording.recorder import MOST_UNREAD, Limits, Recorder
     from hapticd.client import connect as connected
 
     path = output or Path(f"hapticd-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.mcap")
     size_bytes = None if max_size_mb is None else max_size_mb * 1e6
-    wanted: dict[str, Any] = {} if topics is None else {"topics": [*_split(topics), "status", "event"]}
+    wanted: dict[str, Any] = {"receive_high_water": MOST_UNREAD}
+    if topics is not None:
+        wanted["topics"] = [*_split(topics), "status", "event"]
     with (
         connected(instance, telemetry=connect, control=control, keys=keys, **wanted) as daemon,
         stop_signals() as stopped,

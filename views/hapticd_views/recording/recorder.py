@@ -22,6 +22,9 @@ CHUNK_S = 0.4
 SYNC_S = 5.0
 """Time between two syncs: what a power cut may lose [s]."""
 
+MOST_UNREAD = 50_000
+"""Messages that may wait while the computer is too busy for the recorder: three minutes of them at 1 kHz, 100 MB."""
+
 _WAIT_S = 0.05
 _UNEVEN_S = 1.0  # where some topics stay behind, the next file begins all the same
 _REFUSED_S = 1.0  # notes of messages that cannot be used come no faster
