@@ -37,7 +37,8 @@ def position(axes: Axes, runs: Sequence[Curves]) -> None:
         axes.plot(*run.line("x_m", 1e3), **hand(at), label=label if len(runs) == 1 else run.name)
     _aims(axes, [run.rest_m * 1e3 for run in runs], "balance")
     axes.set_ylabel("position [mm]")
-    style.shade_wall(axes)
+    if any(run.inside.any() for run in runs):
+        style.shade_wall(axes)
 
 
 def force(axes: Axes, runs: Sequence[Curves]) -> None:

@@ -82,8 +82,10 @@ def draw(name: str, runs: Sequence[Curves], title: str = "") -> Figure:
             _name_curves(figure, grid, len(runs))
         else:
             figure = _stacked(STACKED[name], runs)
-        if title:
+        if title and len(runs) == 1:
             figure.suptitle(title, fontsize=8.5, fontweight="bold")
+        elif title:  # beside the names of the runs there is no room for another line
+            figure.legends[0].set_title(title, {"weight": "bold", "size": 8.5})
         return figure
 
 
