@@ -6,7 +6,6 @@ pyserial's own `write` tries again and again while the line takes no more, even 
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import select
 import termios
@@ -14,15 +13,10 @@ from pathlib import Path
 
 import serial
 
-from hapticd.errors import (
-    DeviceBusyError,
-    DeviceDisconnectedError,
-    DeviceNotFoundError,
-    DevicePermissionError,
-    DriverError,
-)
+from hapticd.errors import DeviceDisconnectedError
 from hapticd_drivers.rig.frames import FrameReader, framed
 from hapticd_drivers.rig.serial_ports import Port, latency_timer
+from hapticd_drivers.serial_port import open_tty
 
 MOST_BYTES = 4096
 """Most that is read at once: more than a line brings in 10 ms."""
@@ -45,7 +39,7 @@ class SerialLink:
         self._unsent = 0
         self._reader = FrameReader()
         self._rest = b""  # of a frame that has gone out in part
-        self._port = _opened(port, baud)
+        self._port = open_tty("serial-rig", port.path, baud, "the rig")
         self._descriptor: int = self._port.fileno()
         _keep_up(self._descriptor)
         self.notes = _hurry(self._port) if low_latency else ()
@@ -103,28 +97,6 @@ class SerialLink:
 
     def _gone(self, error: OSError) -> DeviceDisconnectedError:
         return DeviceDisconnectedError(f"serial-rig: {self.where} is gone, unplugged perhaps ({error.strerror})")
-
-
-def _opened(port: Port, baud: int) -> serial.Serial:
-    try:
-        return serial.Serial(port.path, baud, timeout=0, write_timeout=0, exclusive=True)
-    except (serial.SerialException, OSError, ValueError, termios.error) as error:
-        raise _refusal(port, baud, error) from error
-
-
-def _refusal(port: Port, baud: int, error: Exception) -> DriverError:
-    number = getattr(error, "errno", None)
-    if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
-        return DeviceNotFoundError(f"serial-rig: there is no {port.path}: is the rig plugged in?")
-    if number in (errno.EACCES, errno.EPERM):
-        return DevicePermissionError(
-            f"serial-rig: this user may not open {port.path}: sudo usermod -aG dialout $USER, then log in again"
-        )
-    if number in (errno.EAGAIN, errno.EBUSY):
-        return DeviceBusyError(
-            f"serial-rig: another program has {port.path} open: end it first (sudo fuser -v {port.path} names it)"
-        )
-    return DeviceNotFoundError(f"serial-rig: {port.path} cannot be opened at {baud} baud: {error}")
 
 
 def _keep_up(descriptor: int) -> None:

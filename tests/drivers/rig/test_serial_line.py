@@ -16,7 +16,8 @@ from pydantic import ValidationError
 from serial.tools import list_ports
 
 from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DevicePermissionError
-from hapticd_drivers.rig import messages, serial_link, serial_ports
+from hapticd_drivers import serial_port
+from hapticd_drivers.rig import messages, serial_ports
 from hapticd_drivers.rig.frames import FrameReader, framed
 from hapticd_drivers.rig.serial_link import SerialLink
 from hapticd_drivers.rig.serial_ports import Port
@@ -162,7 +163,9 @@ def test_a_line_whose_far_end_has_gone_is_a_lost_device() -> None:
 
 
 def test_a_port_that_this_user_may_not_open_names_the_group() -> None:
-    error = serial_link._refusal(Port("/dev/ttyUSB0"), 1_000_000, PermissionError(13, "Permission denied"))
+    error = serial_port._refusal(
+        "serial-rig", "/dev/ttyUSB0", 1_000_000, "the rig", PermissionError(13, "Permission denied")
+    )
     assert isinstance(error, DevicePermissionError)
     assert "usermod -aG dialout" in str(error)
 

@@ -1,0 +1,1 @@
+"""Driver `moteus`: motors behind moteus controllers of mjbots, over fdcanusb or SocketCAN."""

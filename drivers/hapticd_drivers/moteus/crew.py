@@ -1,0 +1,214 @@
+"""moteus controllers on a bus: one frame to each and one back in every tick."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError
+from hapticd_drivers.moteus import registers
+from hapticd_drivers.moteus.faults import stopped_text
+from hapticd_drivers.moteus.registers import (
+    ANSWER,
+    BRAKE,
+    FAULT,
+    FAULTED,
+    FIRMWARE,
+    HOME_AT_OUTPUT,
+    HOME_STATE,
+    MILLISECONDS,
+    MODE,
+    POSITION,
+    POSITION_MODE,
+    PREPARING,
+    SERIAL,
+    STOPPED,
+    TEMPERATURE,
+    TORQUE,
+    VELOCITY,
+    VOLTAGE,
+    VOLTS,
+)
+from hapticd_drivers.motors.crew import Crew, Metered, Motor
+from hapticd_drivers.motors.link import BusLink
+
+_BACKWARDS = 0x80000000  # of a difference of two counts of milliseconds, which wrap after 49 days
+_WITHOUT_FORCE = (STOPPED, FAULTED, BRAKE)
+
+PREPARING_S = 0.3
+"""For this time after it was enabled a controller may get ready, in which it gives no torque [s]."""
+
+
+class MoteusMotor(Motor):
+    """What is known of a controller and its motor.
+
+    Attributes:
+        restarted: it has been switched off and on since it was enabled.
+        most_n_m: torque that it may apply [N m].
+        mode, fault, home_state: its registers.
+        firmware, serial: what it is; "" until it has said so.
+    """
+
+    __slots__ = ("fault", "firmware", "home_state", "milliseconds", "mode", "most_n_m", "restarted", "serial")
+
+    def __init__(self, address: int, most_n_m: float) -> None:
+        super().__init__(address)
+        self.most_n_m = most_n_m
+        self.mode = STOPPED
+        self.fault = 0
+        self.home_state = 0
+        self.milliseconds = 0
+        self.restarted = False
+        self.firmware = ""
+        self.serial = ""
+
+
+class MoteusCrew(Crew):
+    """The controllers on a bus.
+
+    Args:
+        link: the adapter.
+        meter: keeps the metrics.
+        name: of the driver.
+        motors: an address and a largest torque [N m] each.
+        watchdog_s: goes with every torque [s].
+        brake: short the windings to let go, and not just take the current away.
+    """
+
+    REMEMBERS = True
+
+    def __init__(
+        self,
+        link: BusLink,
+        meter: Metered,
+        name: str,
+        motors: list[tuple[int, float]],
+        watchdog_s: float,
+        brake: bool,
+    ) -> None:
+        super().__init__(link, meter, name)
+        self._motors = [MoteusMotor(address, most_n_m) for address, most_n_m in motors]
+        self._by_identifier = {motor.address << 8: motor for motor in self._motors}
+        self._watchdog_s = watchdog_s
+        self._let_go = registers.SHORTED if brake else registers.STOP
+        self._enabled_ns = 0
+
+    @property
+    def motors(self) -> list[Motor]:
+        """The motors, in the order of the axes."""
+        return list[Motor](self._motors)
+
+    def greet(self) -> None:
+        """Learn that all are there, what they are and where, without force."""
+        motors = self._motors
+        self._have_let_go(urgent=False)
+        self._say_until(lambda index: self._send(index, registers.IDENTITY), lambda index: bool(motors[index].serial))
+        self._say_until(lambda index: self._send(index, registers.QUERY), lambda index: motors[index].heard)
+        self.model = f"moteus (firmware {motors[0].firmware})"
+        self.serial = " ".join(motor.serial for motor in motors)
+
+    def enable(self) -> None:
+        """Clear faults whose cause is gone, and have all follow a torque of 0."""
+        self._say_until(
+            lambda index: self._send(index, registers.STOP),
+            lambda index: self._motors[index].heard and self._motors[index].mode == STOPPED,
+            urgent=True,
+        )
+        for motor in self._motors:
+            motor.restarted = False
+        self._enabled_ns = time.monotonic_ns()
+        self._say_until(self._send_no_torque, self._follows, urgent=True)
+
+    def disable(self) -> None:
+        """Let go, until all have said that they have."""
+        self._have_let_go(urgent=True)
+
+    def ask(self) -> None:
+        """Ask for the states."""
+        for index in range(len(self._motors)):
+            self._send(index, registers.QUERY)
+        self._sent_ns = time.monotonic_ns()
+
+    def push(self, torque_n_m: list[float]) -> None:
+        """Set the torques, and ask for the states."""
+        for motor, newton_metre in zip(self._motors, torque_n_m, strict=True):
+            self.link.send(ANSWER | motor.address, registers.torque(newton_metre, motor.most_n_m, self._watchdog_s))
+        self._sent_ns = time.monotonic_ns()
+
+    def problem(self) -> DriverError | None:
+        """Why a controller follows no torque."""
+        for motor in self._motors:
+            if motor.restarted:  # it has followed the next torque at once, and its turns may count from elsewhere
+                return DeviceFaultError(
+                    f"{self._name}: controller {motor.address} was switched off and on: check its supply and plugs"
+                )
+            if motor.mode != POSITION_MODE:
+                if motor.mode in PREPARING and time.monotonic_ns() - self._enabled_ns < PREPARING_S * 1e9:
+                    continue
+                return DeviceFaultError(
+                    f"{self._name}: controller {motor.address} has let go: "
+                    f"{stopped_text(motor.mode, motor.fault, 1e3 * self._watchdog_s)}"
+                )
+        return None
+
+    def set_home(self, turns: list[float | None]) -> None:
+        """Have each count from its home, which it remembers until it is switched off."""
+        for index, (motor, home) in enumerate(zip(self._motors, turns, strict=True)):
+            if home is not None:
+                self._send(index, registers.here_is(motor.turns - home))
+        self._say_until(lambda index: self._send(index, registers.QUERY), lambda index: self._motors[index].heard)
+        if not self.absolute and None not in turns:
+            raise DeviceProtocolError(f"{self._name}: a controller on {self.link.where} has not taken its home")
+
+    def _have_let_go(self, urgent: bool) -> None:
+        self._say_until(
+            lambda index: self._send(index, self._let_go),
+            lambda index: self._motors[index].heard and self._motors[index].mode in _WITHOUT_FORCE,
+            urgent,
+        )
+
+    def _send_no_torque(self, index: int) -> None:
+        self._send(index, registers.torque(0.0, self._motors[index].most_n_m, self._watchdog_s))
+
+    def _follows(self, index: int) -> bool:
+        motor = self._motors[index]
+        return motor.heard and (motor.mode == POSITION_MODE or motor.mode in PREPARING)
+
+    def _send(self, index: int, data: bytes) -> None:
+        self.link.send(ANSWER | self._motors[index].address, data)
+
+    def _take(self, identifier: int, data: bytes) -> bool:
+        motor = self._by_identifier.get(identifier)
+        if motor is None:
+            return False
+        found = registers.answers(data)
+        if found is None:
+            return False
+        try:
+            if POSITION in found:
+                motor.turns = found[POSITION]
+                motor.turns_per_s = found[VELOCITY]
+                motor.torque_n_m = found[TORQUE]
+                motor.mode = int(found[MODE])
+                motor.voltage_v = VOLTS * found[VOLTAGE]
+                motor.temperature_c = found[TEMPERATURE]
+                motor.fault = int(found[FAULT])
+                motor.home_state = int(found[HOME_STATE])
+                milliseconds = int(found.get(MILLISECONDS, motor.milliseconds))  # older firmware has none
+                if milliseconds - motor.milliseconds & _BACKWARDS:
+                    motor.restarted = True
+                motor.milliseconds = milliseconds
+                motor.states += 1
+                motor.heard = True
+                self.absolute = all(motor.home_state == HOME_AT_OUTPUT for motor in self._motors)
+            if SERIAL in found:
+                words = (int(found[SERIAL + word]) & 0xFFFFFFFF for word in range(3))
+                motor.serial = "-".join(f"{word:08x}" for word in words)
+                motor.firmware = f"{int(found[FIRMWARE]):x}"
+        except (KeyError, ValueError):  # half of what was asked for, or not a number where there is always one
+            return False
+        if math.isnan(motor.turns):
+            raise DeviceProtocolError(
+                f"{self._name}: controller {motor.address} does not know where its shaft is: check its encoder (tview)"
+            )
+        return True

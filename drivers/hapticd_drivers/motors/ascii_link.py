@@ -1,0 +1,136 @@
+"""CAN frames as lines of text on a serial port: fdcanusb and slcan adapters."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import serial
+
+from hapticd.errors import DeviceDisconnectedError
+from hapticd_drivers.motors.link import Frame
+from hapticd_drivers.serial_port import open_tty
+
+BAUD = 921_600
+"""Of no meaning to an adapter that is USB itself."""
+
+MOST_BYTES = 16384
+"""Most that is read at once."""
+
+LONGEST_LINE = 512
+"""Bytes without an end of line that are no line any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How an adapter writes frames.
+
+    Attributes:
+        name: of the adapter.
+        end: the byte that ends a line.
+        opening: what is sent when the port has been opened.
+        closing: what is sent before it is closed.
+        line: a frame as a line, its end included.
+        frame: a line without its end as a frame; None for one that is no frame and no damage either.
+    """
+
+    name: str
+    end: bytes
+    opening: bytes
+    closing: bytes
+    line: Callable[[int, bytes], bytes]
+    frame: Callable[[bytes], Frame | None]
+    """Raises ValueError for a line that makes no sense."""
+
+
+class AsciiLink:
+    """A `link.BusLink` on a serial port.
+
+    Args:
+        driver: what the configuration calls it.
+        path: of the port.
+        dialect: of the adapter.
+
+    Raises:
+        DriverError: not there, not permitted, or busy.
+    """
+
+    def __init__(self, driver: str, path: str, dialect: Dialect) -> None:
+        self.where = path
+        self.damaged = 0
+        self.unsent = 0
+        self._driver = driver
+        self._dialect = dialect
+        self._rest = b""  # of a line that has gone out in part
+        self._came = b""  # of a line that has not come whole
+        self._port = open_tty(driver, path, BAUD, f"the {dialect.name} adapter")
+        self._descriptor: int = self._port.fileno()
+        self._write(dialect.opening)
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Send a frame, or drop it when the port can take no more."""
+        if self._rest:
+            self._rest = self._rest[self._write(self._rest) :]
+            if self._rest:
+                self.unsent += 1
+                return
+        line = self._dialect.line(identifier, data)
+        written = self._write(line)
+        if written == 0:
+            self.unsent += 1
+        elif written < len(line):
+            self._rest = line[written:]
+
+    def receive(self) -> list[Frame]:
+        """The frames that have come."""
+        try:
+            data = os.read(self._descriptor, MOST_BYTES)
+        except BlockingIOError:
+            return []
+        except OSError as error:
+            raise self._gone(error) from None
+        if not data:
+            return []
+        dialect = self._dialect
+        *lines, rest = (self._came + data).split(dialect.end)
+        if len(rest) > LONGEST_LINE:
+            self.damaged += 1
+            rest = b""
+        self._came = rest
+        frames = []
+        for line in lines:
+            try:
+                frame = dialect.frame(line)
+            except ValueError:
+                self.damaged += 1
+                continue
+            if frame is not None:
+                frames.append(frame)
+        return frames
+
+    def wait(self, timeout_s: float) -> None:
+        """Return when something may have come, or after this time [s]."""
+        select.select([self._descriptor], [], [], timeout_s)
+
+    def close(self) -> None:
+        """Give it back."""
+        with contextlib.suppress(DeviceDisconnectedError):
+            self._write(self._dialect.closing)
+        with contextlib.suppress(OSError, serial.SerialException):
+            self._port.close()
+
+    def _write(self, data: bytes) -> int:
+        try:
+            return os.write(self._descriptor, data)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise self._gone(error) from None
+
+    def _gone(self, error: OSError) -> DeviceDisconnectedError:
+        return DeviceDisconnectedError(
+            f"{self._driver}: {self.where} is gone, unplugged perhaps ({error.strerror}): plug it in again"
+        )

@@ -1,0 +1,80 @@
+"""Moves the handle for a calibration: a force out, the next states in, once a tick."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from hapticd.errors import DeviceTimeoutError, DriverStateError
+from hapticd_drivers.motors.crew import Crew
+from hapticd_drivers.motors.drum import Drum
+from hapticd_drivers.rig.motion import Moment
+
+COUNTS_PER_TURN = 1 << 20
+"""In which a place is told: finer than any encoder."""
+
+ANSWER_S = 0.05
+MOST_TRIPS = 10
+"""A state is waited for this long [s]; so often may the watchdog trip, since a calibration is no real-time program."""
+
+
+class MotorMover:
+    """A `motion.Mover` on motors that are enabled.
+
+    Args:
+        crew: the motors.
+        drums: their axes.
+        accept: called after each state.
+        called_off: whether the calibration is to end.
+        period_s: time between two forces [s].
+    """
+
+    def __init__(
+        self,
+        crew: Crew,
+        drums: Sequence[Drum],
+        accept: Callable[[], None],
+        called_off: Callable[[], bool],
+        period_s: float,
+    ) -> None:
+        self._crew = crew
+        self._drums = drums
+        self._accept = accept
+        self._called_off = called_off
+        self._period_s = period_s
+        self._started_s = self._due_s = time.monotonic()
+        self._trips = 0
+
+    def push(self, axis: int, force_n: float) -> Moment:
+        """Set the force on one axis, none on the others, and say where it is a tick later.
+
+        Raises:
+            DriverError: called off, or a motor stopped, is silent or is gone.
+        """
+        crew = self._crew
+        torques = [drum.torque_n_m(force_n) if index == axis else 0.0 for index, drum in enumerate(self._drums)]
+        while True:
+            if self._called_off():
+                raise DriverStateError("called off")
+            crew.push(torques)
+            self._due_s = max(self._due_s + self._period_s, time.monotonic())
+            time.sleep(max(0.0, self._due_s - time.monotonic()))
+            if crew.await_states(ANSWER_S):
+                crew.note()
+                problem = crew.problem()
+                if problem is None:
+                    break
+            else:
+                problem = DeviceTimeoutError("a motor has not answered in time during the calibration")
+            self._trips += 1
+            if self._trips > MOST_TRIPS:
+                raise problem
+            crew.enable()
+        self._accept()
+        turns = crew.motors[axis].turns
+        return Moment(
+            time.monotonic() - self._started_s,
+            self._drums[axis].position_m(turns),
+            round(turns * COUNTS_PER_TURN),
+            False,
+        )

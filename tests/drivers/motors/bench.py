@@ -1,0 +1,159 @@
+"""Motors on a bus that are not there: what every family of controllers has in common."""
+
+from __future__ import annotations
+
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, Literal, Self
+
+from hapticd.driver import Driver
+from tests.drivers.motors.shaft import Shaft
+from tests.drivers.motors.wire import Frames, SocketEnd, TtyEnd
+
+TICK_S = 0.001
+PATIENCE_S = 30.0
+
+
+class Controller(ABC):
+    """One controller: what it says to a frame, and what it does while time passes.
+
+    Attributes:
+        shaft: its motor.
+        deaf: says nothing, as one without power or with its cable out.
+        peak_n_m: largest torque that it has given since this was set to 0.
+    """
+
+    def __init__(self, address: int, shaft: Shaft) -> None:
+        self.address = address
+        self.shaft = shaft
+        self.deaf = False
+        self.peak_n_m = 0.0
+
+    @property
+    @abstractmethod
+    def torque_n_m(self) -> float:
+        """What it drives its motor with now."""
+
+    @abstractmethod
+    def hear(self, identifier: int, data: bytes) -> Frames:
+        """Its answers to a frame on the bus."""
+
+    @abstractmethod
+    def pass_time(self, duration_s: float) -> None:
+        """Run its watchdog."""
+
+    @abstractmethod
+    def is_tick(self, identifier: int) -> bool:
+        """Whether this is the frame that comes to it once a tick."""
+
+    def tell(self) -> Frames:
+        """What it says by itself, after a millisecond."""
+        return []
+
+    def advance(self, duration_s: float) -> None:
+        self.pass_time(duration_s)
+        torque_n_m = self.torque_n_m
+        self.peak_n_m = max(self.peak_n_m, abs(torque_n_m))
+        self.shaft.advance(torque_n_m, duration_s)
+
+
+class Bench:
+    """Controllers behind an adapter, served by a thread of its own.
+
+    Args:
+        end: the adapter's far end.
+        controllers: on its bus.
+        pace: "frames": 1 ms passes with each tick of the computer, so that load on it means nothing to the motors;
+            "real": time passes.
+
+    Attributes:
+        spoil: what becomes of the frames that controllers send.
+        heard: frames that have come.
+    """
+
+    def __init__(
+        self, end: TtyEnd | SocketEnd, controllers: list[Any], pace: Literal["frames", "real"] = "frames"
+    ) -> None:
+        self.end = end
+        self.controllers = controllers
+        self.spoil: Callable[[Frames], Frames] = list
+        self.heard = 0
+        self.lock = threading.RLock()
+        self._pace = pace
+        self._running = True
+        self._heard_ns = self._real_ns = time.monotonic_ns()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.unplug()
+
+    def unplug(self) -> None:
+        """Pull the adapter's cable."""
+        if self._running:
+            self._running = False
+            self._thread.join(10.0)
+            self.end.close()
+
+    def pass_time(self, duration_s: float) -> None:
+        """Let time pass without a frame."""
+        with self.lock:
+            for _ in range(round(duration_s / TICK_S)):
+                self._advance(TICK_S)
+
+    def settle(self, driver: Driver[Any]) -> None:
+        """Return when all that the driver has sent has come, and what it caused has been sent."""
+        end_s = time.monotonic() + PATIENCE_S
+        heard = -1
+        while heard != self.heard:
+            heard = self.heard
+            time.sleep(0.003)
+            assert time.monotonic() < end_s
+
+    def _serve(self) -> None:
+        while self._running:
+            frames = self.end.receive(0.0005 if self._pace == "real" else 0.001)
+            with self.lock:
+                now_ns = time.monotonic_ns()
+                if self._pace == "real":
+                    while self._real_ns + 1_000_000 <= now_ns:
+                        self._real_ns = max(self._real_ns + 1_000_000, now_ns - 10_000_000)
+                        self._advance(TICK_S)
+                for identifier, data in frames:
+                    self._take(identifier, data)
+                if frames:
+                    self._heard_ns = now_ns
+                    self.heard += len(frames)
+                elif self._pace == "frames" and now_ns - self._heard_ns > 5_000_000:
+                    self._idle()
+
+    def _take(self, identifier: int, data: bytes) -> None:
+        first = self.controllers[0]
+        if self._pace == "frames" and first.is_tick(identifier):
+            self._advance(TICK_S)
+        for controller in self.controllers:
+            answers = controller.hear(identifier, data)
+            if not controller.deaf:
+                self._send(answers)
+
+    def _advance(self, duration_s: float) -> None:
+        for controller in self.controllers:
+            controller.advance(duration_s)
+            told = controller.tell()
+            if not controller.deaf:
+                self._send(told)
+
+    def _idle(self) -> None:
+        """Nothing has come from the computer for long: what is told by itself is told, and no time passes."""
+        for controller in self.controllers:
+            if not controller.deaf:
+                self._send(controller.tell())
+
+    def _send(self, frames: Frames) -> None:
+        for identifier, data in self.spoil(frames):
+            self.end.send(identifier, data)
