@@ -24,6 +24,7 @@ from hapticd_drivers.moteus.registers import (
     SERIAL,
     STOPPED,
     TEMPERATURE,
+    TIMED_OUT,
     TORQUE,
     VELOCITY,
     VOLTAGE,
@@ -33,6 +34,7 @@ from hapticd_drivers.motors.crew import Crew, Metered, Motor
 from hapticd_drivers.motors.link import BusLink
 
 _BACKWARDS = 0x80000000  # of a difference of two counts of milliseconds, which wrap after 49 days
+_LOOK_S = 0.005
 _WITHOUT_FORCE = (STOPPED, FAULTED, BRAKE)
 
 PREPARING_S = 0.3
@@ -159,6 +161,20 @@ class MoteusCrew(Crew):
         self._say_until(lambda index: self._send(index, registers.QUERY), lambda index: self._motors[index].heard)
         if not self.absolute and None not in turns:
             raise DeviceProtocolError(f"{self._name}: a controller on {self.link.where} has not taken its home")
+
+    def prove_watchdog(self) -> None:
+        """Command nothing while a torque of 0 holds; questions feed no watchdog."""
+        self.enable()
+        end_s = time.monotonic() + 2.0 * self._watchdog_s + PREPARING_S
+        while not all(motor.mode == TIMED_OUT for motor in self._motors):
+            if time.monotonic() > end_s:
+                raise DeviceFaultError(
+                    f"{self._name}: a controller on {self.link.where} goes on when it is told nothing for "
+                    f"{1e3 * self._watchdog_s:g} ms: update its firmware"
+                )
+            self.ask()
+            self.await_states(_LOOK_S)
+            self.note()
 
     def _have_let_go(self, urgent: bool) -> None:
         self._say_until(

@@ -3,8 +3,8 @@
     identifier to a controller      0x8000 (answer wanted) | its address
     identifier of its answer        its address << 8
 
-A subframe is an opcode, the first register, and the values: opcode = direction | type | count; a count of more than three
-in a byte of its own. Directions: 0x00 write, 0x10 read, 0x20 answer, 0x30 and 0x31 refused, 0x50 nothing.
+A subframe is an opcode, the first register, and the values. Opcode = direction | type | count, a count above three in
+a byte of its own. Directions: 0x00 write, 0x10 read, 0x20 answer, 0x30 and 0x31 refused, 0x50 nothing.
 Types: 0x00 int8, 0x04 int16, 0x08 int32, 0x0c float; all little-endian (mjbots/moteus, docs/protocol).
 """
 

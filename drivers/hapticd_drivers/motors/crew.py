@@ -137,6 +137,15 @@ class Crew(ABC):
         """
 
     @abstractmethod
+    def prove_watchdog(self) -> None:
+        """Say nothing while torques of 0 hold, and see that the motors let go by themselves in time.
+
+        Raises:
+            DeviceFaultError: one does not.
+            DriverError: one is silent or gone.
+        """
+
+    @abstractmethod
     def _take(self, identifier: int, data: bytes) -> bool:
         """Take a frame in; whether it is one of ours."""
 
@@ -221,7 +230,7 @@ class Crew(ABC):
             if not waiting:
                 return
             if time.monotonic() >= end_s:
-                problem = self.problem() if all(motor.heard for motor in self.motors) else None
+                problem = self.problem() if urgent and all(motor.heard for motor in self.motors) else None
                 raise problem or self._silent(waiting, patience_s)
 
     def _silent(self, waiting: list[int], patience_s: float) -> DeviceTimeoutError:

@@ -231,7 +231,8 @@ class MotorDriver(Driver[MotorOptionsT]):
             crew = self._opened()
             mover = MotorMover(crew, self._drums, self._accept, lambda: self._called_off, self.period_s)
             try:
-                crew.disable()  # clears a fault whose cause is gone
+                crew.disable()
+                crew.prove_watchdog()
                 crew.enable()
                 for index in range(len(self._drums)):
                     self._calibrate_axis(mover, index)

@@ -1,7 +1,4 @@
-"""Each thing that can go wrong with moteus controllers: how soon it is noticed, what it is called, and what push is left.
-
-`python -m tests.drivers.moteus.test_faults` is not needed for the table: `pytest -rP -k table` prints it.
-"""
+"""Each thing that can go wrong with moteus controllers: how soon it is noticed, its name, and what push is left."""
 
 from __future__ import annotations
 
@@ -260,10 +257,9 @@ def test_a_handle_in_a_loop_is_let_go_when_its_controller_falls_silent(bench: La
     tick.arm()
     fall_silent(bench)
     driver._state_wait_s = 0.001
-    for ticks in range(1, 100):
+    for _ in range(21):
         driver.write(tick.step(driver.read(), 1e-3))
         if tick.fault:
             break
     assert tick.fault == EventCode.DEVICE_FROZEN
-    assert ticks <= 21
     driver.close()

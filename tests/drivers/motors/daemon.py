@@ -1,0 +1,132 @@
+"""The whole daemon on motors that are not there: what every family of controllers has to show.
+
+A millisecond of the motors is a tick of the daemon's, so that load on this computer changes only how long it takes.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from typing import Any
+
+from hapticd.tick.event import EventCode
+from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
+from tests.daemon.test_commands import ask
+from tests.drivers.motors.bench import Bench
+
+LIMIT_N_PER_M = 700.0
+"""The stiffest wall that these motors hold without a law; 1000 N/m shakes [N/m]."""
+
+PRESS_N = 1.0
+START_M = 0.002
+HELD_TICKS = 1000
+STILL_M = 2e-5
+BUSY = {EventCode.LOOP_LATE, EventCode.DEVICE_FROZEN, EventCode.DEVICE_LOST, EventCode.DEVICE_FAULT}
+"""What this computer brings about when it has no time for the loop or for the motors."""
+
+ATTEMPTS = 5
+
+
+def config(device: str, stiffness_n_per_m: float, law: str = "") -> str:
+    """A real configuration: a wall on a device.
+
+    Args:
+        device: its [device.options].
+        stiffness_n_per_m: of the wall.
+        law: "" leaves the default.
+    """
+    return f"""
+[loop]
+law_budget = 1.0
+{device}
+[[scene.walls]]
+axis = "x"
+stiffness_n_per_m = {stiffness_n_per_m}
+{f'[controller]{chr(10)}law = "{law}"' if law else ""}
+[safety]
+auto_arm = true
+max_speed_m_per_s = 20.0
+"""
+
+
+def press(bench: Bench) -> None:
+    """A hand pushes the handle into the wall, from above it."""
+    with bench.lock:
+        shaft = bench.controllers[0].shaft
+        shaft.x_m, shaft.v_m_per_s, shaft.hand_n = START_M, 0.0, -PRESS_N
+
+
+def let_go(bench: Bench) -> None:
+    """The hand takes the handle out of the wall."""
+    with bench.lock:
+        shaft = bench.controllers[0].shaft
+        shaft.x_m, shaft.v_m_per_s, shaft.hand_n = START_M, 0.0, 0.0
+
+
+def places_m(daemon: Daemon, bench: Bench, ticks: int) -> list[float]:
+    """Where the daemon says that the handle is, in the last of some ticks that nothing has disturbed [m]."""
+    for _ in range(ATTEMPTS):
+        with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
+            subscriber.until("hapticd/status")  # it is connected
+            let_go_and_arm(daemon, bench)
+            found: list[float] | None = None
+            for topic, fields in subscriber.maps():
+                if found is None and topic == "hapticd/status" and fields["armed"]:
+                    press(bench)
+                    found = []
+                if topic == "hapticd/event" and 200 <= fields["code"] < 300:
+                    assert fields["code"] in BUSY, fields
+                    break
+                if found is not None and topic == "hapticd/position":
+                    found.append(fields["position_m"][0])
+                    if len(found) == ticks:
+                        return found[-HELD_TICKS:]
+    raise AssertionError(f"disturbed {ATTEMPTS} times: {daemon.output()}")
+
+
+def let_go_and_arm(daemon: Daemon, bench: Bench) -> None:
+    """As a user would: clear a fault that arming tells of, and arm again."""
+    let_go(bench)
+    end_s = time.monotonic() + PATIENCE_S
+    while any((told := ask(daemon, word)).returncode != 0 for word in ("clear", "arm")):
+        assert time.monotonic() < end_s, f"{told.args} was refused: {told.stderr} {daemon.output()}"
+
+
+def holds(daemon: Daemon, bench: Bench, stiffness_n_per_m: float) -> tuple[float, float]:
+    """How far the handle moves to and fro at the end, and where it is beside where the wall should hold it [m]."""
+    found = places_m(daemon, bench, 4 * HELD_TICKS)
+    return max(found) - min(found), sum(found) / len(found) + PRESS_N / stiffness_n_per_m
+
+
+def lost_and_found(daemon: Daemon, bench: Bench, plug: Callable[[], Any]) -> str:
+    """Pull the adapter while the wall pushes, put it in again; what the daemon said."""
+    with Subscriber(daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is connected
+        push(daemon, bench)
+        bench.unplug()
+        lost = subscriber.until("hapticd/event", code=EventCode.DEVICE_LOST)
+        plug()
+        subscriber.until("hapticd/event", code=EventCode.DEVICE_FOUND)
+    return str(lost["text"])
+
+
+def push(daemon: Daemon, bench: Bench) -> None:
+    """Press until the wall pushes; again when this computer was so busy that the loop has let go."""
+    for _ in range(ATTEMPTS):
+        let_go_and_arm(daemon, bench)
+        press(bench)
+        end_s = time.monotonic() + 5.0
+        while time.monotonic() < end_s:
+            if bench.controllers[0].torque_n_m != 0.0:
+                return
+            time.sleep(0.001)
+    raise AssertionError(f"the wall did not push: {daemon.output()}")
+
+
+def kill_the_loop(daemon: Daemon, bench: Bench) -> None:
+    """End the control process while the wall pushes; returns when the supervisor has ended as well."""
+    push(daemon, bench)
+    os.kill(daemon.control_pid(), signal.SIGKILL)
+    assert daemon.wait_exit() == 1

@@ -1,0 +1,71 @@
+"""A calibration tries the watchdog, checks the sign and finds home."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hapticd.errors import DeviceFaultError, DriverStateError
+from hapticd_drivers.motors import crew
+from hapticd_drivers.odrive import crew as odrive_crew
+from tests.drivers.motors.bench import PATIENCE_S
+from tests.drivers.odrive.lab import RADIUS_M, Lab, axes, lab
+
+BOUND_N = 0.5
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
+    monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
+    monkeypatch.setattr(odrive_crew, "LOOKED_S", PATIENCE_S)
+    monkeypatch.setattr(odrive_crew, "HEARTBEAT_S", PATIENCE_S)
+    with lab("slcan", tmp_path, 1, monkeypatch) as made:
+        made.first.shaft.x_m = -0.035
+        made.first.watchdog_s = 0.2
+        made.bench.idle_passes = True
+        yield made
+
+
+def test_it_tries_the_watchdog_and_finds_the_stop(bench: Lab) -> None:
+    driver = bench.driver(
+        axes=axes(1),
+        sign_checked=False,
+        watchdog_ms=200.0,
+        calibration_speed_m_per_s=0.1,
+        calibration_force_n=BOUND_N,
+    )
+    driver.open()
+    with pytest.raises(DriverStateError, match="hapticd calibrate"):
+        driver.enable()
+    driver.calibrate()
+    assert bench.first.peak_n_m <= BOUND_N * RADIUS_M * 1.001
+    assert bench.first.torque_n_m == 0.0
+    driver._state_wait_s = PATIENCE_S
+    assert driver.read().calibrated
+    assert driver.read().position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=3e-4)
+    driver.enable()
+    driver.close()
+    assert not bench.driver(axes=axes(1)).open().simulated  # another start of the daemon: it has to be calibrated again
+
+
+def test_an_odrive_without_the_watchdog_that_is_declared_does_not_pass(bench: Lab) -> None:
+    bench.first.watchdog_s = 0.0
+    driver = bench.driver(sign_checked=False)
+    driver.open()
+    with pytest.raises(DeviceFaultError, match="enable_watchdog = True"):
+        driver.calibrate()
+    assert bench.first.torque_n_m == 0.0
+    assert bench.first.peak_n_m == 0.0
+    driver.close()
+
+
+def test_a_motor_that_pushes_the_wrong_way_is_refused(bench: Lab) -> None:
+    bench.first.shaft.motor = -1.0
+    driver = bench.driver(sign_checked=False, watchdog_ms=200.0)
+    driver.open()
+    with pytest.raises(DeviceFaultError, match="motor_reversed"):
+        driver.calibrate()
+    assert bench.first.torque_n_m == 0.0
+    driver.close()
