@@ -180,8 +180,8 @@ class OdriveCrew(Crew):
             left_s = end_s - time.monotonic()
             if left_s <= 0.0:
                 raise DeviceProtocolError(
-                    f"{self._name}: ODrive {slow[0].address} sends {slow[0].beats} heartbeats in {1e3 * LOOKED_S:g} ms, "
-                    "too few to see it let go: set axis0.config.can.heartbeat_msg_rate_ms = 10"
+                    f"{self._name}: ODrive {slow[0].address} sends {slow[0].beats} heartbeats in {LOOKED_S:g} s, too "
+                    "few: set axis0.config.can.heartbeat_msg_rate_ms = 10"
                 )
             self.link.wait(left_s)
             self.hear()

@@ -26,21 +26,22 @@ WATCHDOG = st.floats(0.0009765625, 1.0, width=32)
 INTEGERS = {mp.INT8: 8, mp.INT16: 16, mp.INT32: 32}
 
 
-class Quiet(TransportDevice):
+class Quiet(TransportDevice):  # type: ignore[misc]  # it publishes no types
     """A transport of the maker's, for its padding alone."""
 
     def padded(self, data: bytes) -> bytes:
-        return data + bytes.fromhex(self._padding_hex) * (self._round_up_dlc(len(data)) - len(data))
+        filling: bytes = bytes.fromhex(self._padding_hex) * (self._round_up_dlc(len(data)) - len(data))
+        return data + filling
 
 
-class Asked(QueryResolution):
+class Asked(QueryResolution):  # type: ignore[misc]
     """What is asked for in every tick."""
 
     home_state = mp.INT8
     _extra = {Register.MILLISECOND_COUNTER: mp.INT32}  # noqa: RUF012 - the maker's own way
 
 
-class Commanded(PositionResolution):
+class Commanded(PositionResolution):  # type: ignore[misc]
     """How the one value that is always 0 goes out."""
 
     ilimit_scale = mp.INT8

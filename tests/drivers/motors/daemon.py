@@ -68,21 +68,22 @@ def let_go(bench: Bench) -> None:
 def places_m(daemon: Daemon, bench: Bench, ticks: int) -> list[float]:
     """Where the daemon says that the handle is, in the last of some ticks that nothing has disturbed [m]."""
     for _ in range(ATTEMPTS):
+        let_go_and_arm(daemon, bench)
         with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
-            subscriber.until("hapticd/status")  # it is connected
-            let_go_and_arm(daemon, bench)
-            found: list[float] | None = None
+            if not subscriber.until("hapticd/status")["armed"]:
+                continue
+            press(bench)
+            found: list[float] = []
             for topic, fields in subscriber.maps():
-                if found is None and topic == "hapticd/status" and fields["armed"]:
-                    press(bench)
-                    found = []
                 if topic == "hapticd/event" and 200 <= fields["code"] < 300:
                     assert fields["code"] in BUSY, fields
                     break
-                if found is not None and topic == "hapticd/position":
+                if topic == "hapticd/position":
                     found.append(fields["position_m"][0])
-                    if len(found) == ticks:
+                if topic == "hapticd/status" and len(found) >= ticks:
+                    if fields["armed"]:
                         return found[-HELD_TICKS:]
+                    break
     raise AssertionError(f"disturbed {ATTEMPTS} times: {daemon.output()}")
 
 

@@ -103,7 +103,7 @@ class OdriveController(Controller):
         frames: Frames = []
         self._told += 1
         if self.heartbeat_ms and self._told % self.heartbeat_ms == 0:
-            values = {
+            values: dict[str, float] = {
                 "Axis_Error": self.error,
                 "Axis_State": self.state,
                 "Procedure_Result": 0,
