@@ -10,6 +10,7 @@ from typing import ClassVar, TypeVar
 from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import ConfigError, DeviceProtocolError, DeviceTimeoutError, DriverStateError
+from hapticd.trace import DriverTrace
 from hapticd_drivers.motors.crew import Crew
 from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.motors.link import BusLink, TracedLink
@@ -17,7 +18,6 @@ from hapticd_drivers.motors.metrics import METRICS, TICKS_WITHOUT_STATE
 from hapticd_drivers.motors.mover import COUNTS_PER_TURN, MotorMover
 from hapticd_drivers.motors.options import MotorOptions, refuse_axes
 from hapticd_drivers.rig import motion
-from hapticd_drivers.trace import Trace
 
 PATIENCE = 0.25
 """Share of the period for which a tick waits for states that are late."""
@@ -48,7 +48,7 @@ class MotorDriver(Driver[MotorOptionsT]):
     def __init__(self, options: MotorOptionsT, period_s: float) -> None:
         super().__init__(options, period_s)
         self._crew: Crew | None = None
-        self._trace = Trace(options.trace)
+        self.trace = DriverTrace(options.trace)
         self._drums = [Drum(axis) for axis in options.axes]
         self._sample = Sample(len(self._drums))
         self._state_wait_s = PATIENCE * period_s
@@ -70,10 +70,6 @@ class MotorDriver(Driver[MotorOptionsT]):
         """
         refuse_axes(options)
 
-    def trace_lines(self) -> list[str]:
-        """The last frames both ways, oldest first; none unless `device.options.trace` says how many."""
-        return self._trace.lines()
-
     @abstractmethod
     def _connect(self) -> BusLink:
         """Open the adapter.
@@ -94,7 +90,7 @@ class MotorDriver(Driver[MotorOptionsT]):
     def _open(self) -> DeviceInfo:
         link = self._connect()
         if self.options.trace:
-            link = TracedLink(link, self._trace)
+            link = TracedLink(link, self.trace)
         self._crew = crew = self._gather(link)
         crew.greet()
         crew.note()

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from hapticd.errors import DeviceNotFoundError, DriverError
-from hapticd_drivers.trace import Trace
+from hapticd.trace import DriverTrace
 
 AUTO = "auto"
 
@@ -59,7 +59,7 @@ class TracedLink:
         trace: where frames are kept.
     """
 
-    def __init__(self, link: BusLink, trace: Trace) -> None:
+    def __init__(self, link: BusLink, trace: DriverTrace) -> None:
         self.where = link.where
         self.damaged = link.damaged
         self.unsent = link.unsent

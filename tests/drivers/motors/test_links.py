@@ -20,11 +20,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.errors import DeviceBusyError, DeviceDisconnectedError, DeviceNotFoundError
+from hapticd.trace import DriverTrace
 from hapticd_drivers.motors import fdcanusb, link, slcan, socketcan
 from hapticd_drivers.motors.ascii_link import AsciiLink, Dialect
 from hapticd_drivers.motors.link import TracedLink, only
 from hapticd_drivers.motors.socketcan import SocketCanLink, open_can
-from hapticd_drivers.trace import Trace
 from tests.examples import examples
 
 DIALECTS = [fdcanusb.DIALECT, slcan.dialect(1_000_000)]
@@ -226,7 +226,7 @@ def test_interfaces_are_those_whose_type_is_can(tmp_path: Path, monkeypatch: pyt
 
 def test_a_trace_has_frames_both_ways_and_what_went_wrong() -> None:
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    trace = Trace(100)
+    trace = DriverTrace(100)
     made = TracedLink(SocketCanLink("test", "can0", False, near), trace)
     made.send(0x8001, b"\x01")
     far.recv(128)
