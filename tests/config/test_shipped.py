@@ -16,7 +16,7 @@ from hapticd.paths import directory
 from hapticd.tick.assemble import make_tick, place_device
 
 SHIPPED = sorted(directory("config").glob("*.toml"))
-REAL_DEVICES = {"hid-rig", "moteus", "odrive", "omega7", "serial-rig"}
+REAL_DEVICES = {"hid-rig", "inverse3", "moteus", "odrive", "omega7", "serial-rig"}
 RESTS = ["fig6-set1", "fig6-set2-wall", "fig6-set2-device", "native-8-none", "every-term"] + [
     f"wall-{k}-{law}" for k in (12, 18, 20) for law in ("energy-cycle", "tdpa")
 ]

@@ -32,7 +32,11 @@ HEARTBEAT_S = 0.05
 
 LOOKED_S = 0.3
 LEAST_BEATS = 6
+_LOOK_S = 0.001
 """This many heartbeats have to come in this time: what a loop waits for is seen in them [s]."""
+
+OBEYS_S = 0.1
+"""An ODrive that was enabled says within this time that it follows [s]; until then it may not, and gives no torque."""
 
 WATCHDOG_MARGIN = 1.5
 """A watchdog has to act within this many times its own time, when a calibration tries it."""
@@ -46,10 +50,11 @@ class OdriveMotor(Motor):
         error, reason: its active errors, and why it let go last.
         beats: heartbeats that have come.
         beat_ns: when the last of them came.
+        follows: it has followed torques since it was enabled.
         version: hardware and firmware, "" when it has not said so.
     """
 
-    __slots__ = ("beat_ns", "beats", "error", "reason", "state", "version")
+    __slots__ = ("beat_ns", "beats", "error", "follows", "reason", "state", "version")
 
     def __init__(self, address: int) -> None:
         super().__init__(address)
@@ -58,6 +63,7 @@ class OdriveMotor(Motor):
         self.reason = 0
         self.beats = 0
         self.beat_ns = 0
+        self.follows = False
         self.version = ""
 
 
@@ -81,6 +87,7 @@ class OdriveCrew(Crew):
         self._motors = [OdriveMotor(address) for address in addresses]
         self._by_address = {motor.address: motor for motor in self._motors}
         self._watchdog_s = watchdog_s
+        self._enabled_ns = 0
         self._torques = [cansimple.identifier(address, SET_TORQUE) for address in addresses]
 
     @property
@@ -105,16 +112,15 @@ class OdriveCrew(Crew):
         self.model = f"ODrive ({version})" if version else "ODrive"
 
     def enable(self) -> None:
-        """Clear errors whose cause is gone, and have all follow a torque of 0."""
-        motors = self._motors
-        for motor in motors:
+        """Clear errors whose cause is gone, and have all follow a torque of 0; heartbeats show soon whether they do.
+
+        It does not wait for them, since a loop may not.
+        """
+        for index, motor in enumerate(self._motors):
             motor.beats = 0
-            motor.reason = 0
-        self._say_until(
-            self._close_loop,
-            lambda index: motors[index].beats > 0 and motors[index].state == CLOSED_LOOP,
-            urgent=True,
-        )
+            motor.follows = False
+            self._close_loop(index)
+        self._enabled_ns = time.monotonic_ns()
 
     def disable(self) -> None:
         """Let go, until all have said that they have."""
@@ -139,6 +145,8 @@ class OdriveCrew(Crew):
         """Why an ODrive follows no torque."""
         for motor in self._motors:
             if motor.error or motor.state != CLOSED_LOOP:
+                if not motor.follows and time.monotonic_ns() - self._enabled_ns < OBEYS_S * 1e9:
+                    continue
                 why = errors_text(motor.error or motor.reason) or (
                     f"it is in state {motor.state} and names no error; it was restarted, or another program told it to"
                 )
@@ -158,7 +166,14 @@ class OdriveCrew(Crew):
         if self._watchdog_s is None:
             return
         self.enable()
-        self.push([0.0] * len(self._motors))
+        end_s = time.monotonic() + OBEYS_S
+        while not all(motor.follows for motor in self._motors) and time.monotonic() < end_s:
+            self.push([0.0] * len(self._motors))
+            self.link.wait(_LOOK_S)
+            self.hear()
+        problem = self.problem()
+        if problem is not None:
+            raise problem
         end_s = time.monotonic() + WATCHDOG_MARGIN * self._watchdog_s + 2.0 * HEARTBEAT_S
         while not all(motor.error & WATCHDOG_EXPIRED for motor in self._motors):
             left_s = end_s - time.monotonic()
@@ -215,6 +230,8 @@ class OdriveCrew(Crew):
                 motor.error, motor.state = cansimple.heartbeat(data)
                 motor.beats += 1
                 motor.beat_ns = time.monotonic_ns()
+                if motor.state == CLOSED_LOOP and not motor.error:
+                    motor.follows = True
             elif message == ERRORS:
                 motor.error, motor.reason = cansimple.errors(data)
             elif message == BUS:

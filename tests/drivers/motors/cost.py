@@ -1,8 +1,8 @@
-"""What a tick costs with motor controllers, beside the simulated device's tick.
+"""What a tick costs with motor controllers and with an Inverse3, beside the simulated device's tick.
 
 python -m tests.drivers.motors.cost [TICKS]
 
-The controllers are in this process and answer over pseudo-terminals; what is measured is the daemon's own loop in a
+The controllers are in this process and answer over pseudo-terminals and a WebSocket; what is measured is the daemon's own loop in a
 process of its own. What USB and the bus add only a device can tell.
 """
 
@@ -16,6 +16,7 @@ from pathlib import Path
 
 from hapticd_bench.tick.bodies import ROUNDS, Bodies, measure_bodies
 from hapticd_bench.tick.case import Case, scene
+from tests.drivers.haply.service import FakeService
 from tests.drivers.moteus.controller import MoteusController
 from tests.drivers.motors.bench import Bench, Controller
 from tests.drivers.motors.shaft import Shaft
@@ -39,6 +40,8 @@ def measure(ticks: int) -> Bodies:
             port = Path(directory) / f"{name}-{motors}"
             stack.enter_context(_bench(name, motors, port))
             cases.append(Case("device", f"{name}, {motors}", _text(name, motors, port)))
+        service = stack.enter_context(FakeService())
+        cases.append(Case("device", "inverse3", _service_text(service.url)))
         return measure_bodies(cases, ticks, min(ROUNDS, ticks), lambda _: None)
 
 
@@ -82,6 +85,13 @@ def _text(name: str, motors: int, port: Path) -> str:
         "sign_checked = true\nwatchdog_ms = 1000.0\n"
         f'{axes}[[scene.walls]]\naxis = "x"\nstiffness_n_per_m = {SOFT_N_PER_M}\n[velocity]\nestimator = "device"\n'
         "[safety]\nmax_speed_m_per_s = 100.0\n"
+    )
+
+
+def _service_text(url: str) -> str:
+    return (
+        f'[device]\ndriver = "inverse3"\naccept_no_watchdog = true\n[device.options]\nurl = "{url}"\n'
+        f'[[scene.walls]]\naxis = "x"\nstiffness_n_per_m = {SOFT_N_PER_M}\n[safety]\nmax_speed_m_per_s = 100.0\n'
     )
 
 

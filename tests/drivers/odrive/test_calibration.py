@@ -20,6 +20,7 @@ BOUND_N = 0.5
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
     monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
     monkeypatch.setattr(odrive_crew, "LOOKED_S", PATIENCE_S)
+    monkeypatch.setattr(odrive_crew, "OBEYS_S", PATIENCE_S)
     monkeypatch.setattr(odrive_crew, "HEARTBEAT_S", PATIENCE_S)
     with lab("slcan", tmp_path, 1, monkeypatch) as made:
         made.first.shaft.x_m = -0.035
@@ -47,7 +48,8 @@ def test_it_tries_the_watchdog_and_finds_the_stop(bench: Lab) -> None:
     assert driver.read().position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=3e-4)
     driver.enable()
     driver.close()
-    assert not bench.driver(axes=axes(1)).open().simulated  # another start of the daemon: it has to be calibrated again
+    with bench.driver(axes=axes(1)) as again, pytest.raises(DriverStateError, match="not known where the handle is"):
+        again.enable()  # another start of the daemon: it has to be calibrated anew
 
 
 def test_an_odrive_without_the_watchdog_that_is_declared_does_not_pass(bench: Lab) -> None:

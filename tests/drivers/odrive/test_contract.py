@@ -23,6 +23,8 @@ class TestOdrive(DriverContract):
     ) -> Iterator[AnyDriver]:
         monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
         monkeypatch.setattr(odrive_crew, "HEARTBEAT_S", PATIENCE_S)
+        monkeypatch.setattr(odrive_crew, "OBEYS_S", PATIENCE_S)
+        monkeypatch.setattr(odrive_crew, "LOOKED_S", PATIENCE_S)
         way, count = request.param
         with lab(way, tmp_path, count, monkeypatch) as made:
             self.lab: Lab = made

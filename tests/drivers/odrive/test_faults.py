@@ -43,6 +43,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A busy computer is no fault."""
     monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
     monkeypatch.setattr(odrive_crew, "LOOKED_S", PATIENCE_S)
+    monkeypatch.setattr(odrive_crew, "OBEYS_S", PATIENCE_S)
 
 
 def pressing(made: Lab) -> Odrive:
@@ -107,9 +108,11 @@ FAULTS: dict[str, tuple[Callable[[Lab], Any], type[DriverError], str, int]] = {
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_what_goes_wrong_is_named_soon_and_leaves_no_force(
-    bench: Lab, name: str, record_property: Callable[[str, object], None]
+    bench: Lab, name: str, record_property: Callable[[str, object], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     happen, kind, text, most_ticks = FAULTS[name]
+    if kind is not DeviceTimeoutError:
+        monkeypatch.setattr(odrive_crew, "HEARTBEAT_S", PATIENCE_S)
     driver = pressing(bench)
     bench.first.peak_n_m = 0.0
     happen(bench)
@@ -135,7 +138,8 @@ def test_the_watchdog_is_the_one_that_is_declared(bench: Lab) -> None:
     bench.first.pass_time(0.01)
     assert bench.first.torque_n_m == 0.0
     driver.close()
-    assert bench.driver(watchdog_ms=None).open().host_silence_ms is None
+    with bench.driver(watchdog_ms=None) as without:
+        assert without.info.host_silence_ms is None
 
 
 def test_an_odrive_that_let_go_follows_again_only_when_it_is_enabled(bench: Lab) -> None:

@@ -1,0 +1,221 @@
+"""Each thing that can go wrong with the Inverse service: how soon it is noticed, its name, and what push is left."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DeviceTimeoutError, DriverError
+from hapticd_drivers.haply import driver as haply_driver
+from hapticd_drivers.haply import messages
+from hapticd_drivers.haply.driver import BAD, Inverse3, Inverse3Options
+from tests.drivers.haply.service import FakeService
+from tests.examples import examples
+
+PUSH_N = 1.0
+
+
+@pytest.fixture
+def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeService]:
+    monkeypatch.setattr(haply_driver, "URGENT_S", 5.0)
+    with FakeService() as made:
+        yield made
+
+
+def opened(service: FakeService, **keys: Any) -> Inverse3:
+    driver = Inverse3(Inverse3Options.model_validate({"url": service.url, **keys}), 0.001)
+    driver._state_wait_s = 1.0  # a busy computer is no fault
+    driver.open()
+    return driver
+
+
+def pressing(service: FakeService) -> Inverse3:
+    driver = opened(service)
+    driver.enable()
+    for _ in range(10):
+        driver.read()
+        driver.write([0.0, 0.0, PUSH_N])
+    driver.read()
+    return driver
+
+
+def ticks_until(driver: Inverse3, kind: type[DriverError], text: str) -> int:
+    driver._state_wait_s = 0.002
+    ticks = 0
+
+    def press_on() -> None:
+        nonlocal ticks
+        while ticks < 2000:
+            ticks += 1
+            driver.read()
+            driver.write([0.0, 0.0, PUSH_N])
+
+    with pytest.raises(kind, match=text):
+        press_on()
+    return ticks
+
+
+FAULTS: dict[str, tuple[Callable[[FakeService], None], type[DriverError], str, int]] = {
+    "the service ends": (FakeService.stop, DeviceDisconnectedError, "is gone", 2000),
+    "the device is unplugged": (lambda made: setattr(made, "device", ""), DeviceDisconnectedError, "no more", 2000),
+    "the service is silent": (
+        lambda made: setattr(made, "mute", True),
+        DeviceTimeoutError,
+        "has said nothing for 500 ticks",
+        502,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_goes_wrong_is_named_and_no_more_force_is_asked_for(service: FakeService, name: str) -> None:
+    happen, kind, text, most_ticks = FAULTS[name]
+    driver = pressing(service)
+    service.peak_n = 0.0
+    happen(service)
+    ticks = ticks_until(driver, kind, text)
+    assert ticks <= most_ticks
+    assert service.peak_n <= PUSH_N * 1.001
+    driver.close()
+    print(f"| {name} | {ticks} | {service.peak_n:.2f} |")  # noqa: T201 - the table of docs/inverse3.md
+
+
+def test_disable_and_close_leave_a_force_of_zero(service: FakeService) -> None:
+    driver = pressing(service)
+    assert service.cursor.force_n == [0.0, 0.0, PUSH_N]
+    driver.disable()
+    assert service.cursor.force_n == [0.0, 0.0, 0.0]
+    driver.enable()
+    driver.write([0.0, 0.0, PUSH_N])
+    driver.close()
+    assert service.cursor.force_n == [0.0, 0.0, 0.0]
+
+
+def test_one_message_a_force_and_one_state_a_message(service: FakeService) -> None:
+    """Nothing is sent that no tick has asked for, and no state comes unasked."""
+    driver = pressing(service)
+    before, sequence = service.messages, driver.read().sequence
+    for _ in range(50):
+        driver.write([0.0, 0.1, 0.0])
+        driver.read()
+    assert service.messages == before + 50
+    assert driver.read().sequence == sequence + 50
+    driver.close()
+
+
+@pytest.mark.parametrize(
+    "spoilt", ["", "no JSON", "[]", '{"inverse3": 5}', '{"inverse3":[{"device_id":"049D"}]}', "NaN"]
+)
+def test_a_message_that_makes_no_sense_is_counted_and_not_believed(service: FakeService, spoilt: str) -> None:
+    driver = pressing(service)
+    x_m = list(driver.read().position_m)
+    service.spoil.append(spoilt)
+    driver.write([0.0, 0.0, 0.0])
+    driver._state_wait_s = 0.05
+    end_s = time.monotonic() + 5.0
+    while not driver.metrics[BAD] and time.monotonic() < end_s:
+        assert driver.read().position_m == pytest.approx(x_m, abs=1e-3)
+    assert driver.metrics[BAD] == 1
+    driver.close()
+
+
+def test_a_place_that_is_no_number_is_no_place(service: FakeService) -> None:
+    driver = pressing(service)
+    service.cursor.x_m[0] = math.nan  # Python writes NaN into JSON
+    driver.write([0.0, 0.0, 0.0])
+    driver._state_wait_s = 0.05
+    end_s = time.monotonic() + 5.0
+    while not driver.metrics[BAD] and time.monotonic() < end_s:
+        assert all(map(math.isfinite, driver.read().position_m))
+    assert driver.metrics[BAD] == 1
+    driver.close()
+
+
+def test_grip_orientation_and_buttons_are_there(service: FakeService) -> None:
+    driver = opened(service)
+    sample = driver.read()
+    assert sample.orientation == pytest.approx([0, -1, 0, 1, 0, 0, 0, 0, 1], abs=1e-12)  # a quarter turn about z
+    assert sample.buttons == 0b010
+    driver.close()
+
+
+@pytest.mark.parametrize("key", ["vector", "values"])
+def test_either_name_of_a_force_arrives_where_the_service_knows_it(service: FakeService, key: str) -> None:
+    service.accepts = (key,)
+    driver = opened(service, force_key=key)
+    driver.enable()
+    driver.write([0.5, 0.0, 0.0])
+    driver.read()
+    end_s = time.monotonic() + 5.0
+    while service.cursor.force_n != [0.5, 0.0, 0.0]:
+        assert time.monotonic() < end_s
+        time.sleep(0.001)
+    driver.close()
+
+
+def test_without_a_service_or_a_device_it_says_what_to_do(service: FakeService) -> None:
+    with pytest.raises(DeviceNotFoundError, match="049D"):
+        opened(service, device="0000")
+    service.device = ""
+    with pytest.raises(DeviceNotFoundError, match="lists none"):
+        opened(service)
+    assert Inverse3.find(Inverse3Options(url=service.url)) == []
+    service.stop()
+    with pytest.raises(DeviceNotFoundError, match="install and start it"):
+        opened(service)
+    assert Inverse3.find(Inverse3Options(url=service.url)) == []
+
+
+def test_it_is_found_where_the_service_runs(service: FakeService) -> None:
+    (found,) = Inverse3.find(Inverse3Options(url=service.url))
+    assert (found.serial, found.where) == ("049D", service.url)
+    assert service.messages == 0
+
+
+@examples(300)
+@given(
+    force_n=st.tuples(*[st.floats(-10, 10)] * 3), device=st.text(max_size=20), key=st.sampled_from(["vector", "values"])
+)
+def test_what_is_sent_is_the_json_of_the_public_pages(
+    force_n: tuple[float, float, float], device: str, key: str
+) -> None:
+    said = json.loads(messages.force(device, key, force_n))
+    commands = {"set_cursor_force": {key: dict(zip("xyz", force_n, strict=True))}}
+    assert said == {"inverse3": [{"device_id": device, "commands": commands}]}
+    asked = json.loads(messages.question(device))
+    assert asked == {"inverse3": [{"device_id": device, "commands": {"probe_position": {}}}]}
+
+
+JSON = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.floats(), st.text(max_size=5)),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3),
+        st.dictionaries(
+            st.sampled_from(
+                ["inverse3", "device_id", "state", "cursor_position", "x", "y", "z", "wireless_verse_grip"]
+            ),
+            inner,
+            max_size=4,
+        ),
+    ),
+    max_leaves=12,
+)
+
+
+@examples(300)
+@given(said=st.one_of(JSON.map(json.dumps), st.text(max_size=60)))
+def test_whatever_the_service_says_it_is_a_state_or_refused(said: str) -> None:
+    for read in (lambda: messages.devices(said), lambda: messages.state(said, "049D")):
+        try:
+            found = read()
+        except ValueError:
+            continue
+        if isinstance(found, messages.State):
+            assert all(map(math.isfinite, [*found.position_m, *found.velocity_m_per_s, *found.orientation]))
