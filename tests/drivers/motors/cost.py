@@ -2,8 +2,8 @@
 
 python -m tests.drivers.motors.cost [TICKS]
 
-The controllers are in this process and answer over pseudo-terminals and a WebSocket; what is measured is the daemon's own loop in a
-process of its own. What USB and the bus add only a device can tell.
+The controllers are in this process and answer over pseudo-terminals and a WebSocket; what is measured is the daemon's
+own loop in a process of its own. What USB and the bus add only a device can tell.
 """
 
 from __future__ import annotations
