@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import random
 import struct
 
 import pytest
@@ -34,14 +35,14 @@ class Quiet(TransportDevice):  # type: ignore[misc]  # it publishes no types
         return data + filling
 
 
-class Asked(QueryResolution):  # type: ignore[misc]
+class Asked(QueryResolution):  # type: ignore[misc]  # it publishes no types
     """What is asked for in every tick."""
 
     home_state = mp.INT8
     _extra = {Register.MILLISECOND_COUNTER: mp.INT32}  # noqa: RUF012 - the maker's own way
 
 
-class Commanded(PositionResolution):  # type: ignore[misc]
+class Commanded(PositionResolution):  # type: ignore[misc]  # nor here
     """How the one value that is always 0 goes out."""
 
     ilimit_scale = mp.INT8
@@ -158,8 +159,8 @@ def test_what_is_too_long_for_a_frame_is_never_sent() -> None:
 
 @examples(300)
 @given(identifier=st.integers(0, 0x1FFFFFFF), size=st.sampled_from(registers._SIZES[1:]), filling=st.randoms())
-def test_a_line_is_what_the_makers_package_writes(identifier: int, size: int, filling: object) -> None:
-    data = bytes(filling.randrange(256) for _ in range(size))  # type: ignore[attr-defined]
+def test_a_line_is_what_the_makers_package_writes(identifier: int, size: int, filling: random.Random) -> None:
+    data = bytes(filling.randrange(256) for _ in range(size))
     written: list[bytes] = []
     device = FdcanusbDevice.__new__(FdcanusbDevice)
     TransportDevice.__init__(device)
