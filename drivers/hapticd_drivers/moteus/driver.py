@@ -133,7 +133,9 @@ def _adapters() -> list[tuple[str, str]]:
     return [
         (port.device, port.serial_number or "")
         for port in sorted(list_ports.comports())
-        if port.vid is not None and f"{port.vid:04x}:{port.pid:04x}" in USB
+        if port.vid is not None
+        and (usb := f"{port.vid:04x}:{port.pid:04x}") in USB
+        and (usb != USB[0] or "fdcanusb" in (port.product or ""))
     ]
 
 
