@@ -29,6 +29,8 @@ class Prepared:
         trace_last_s: float = math.inf,
     ) -> None:
         device, period_s = point.device, point.period_s
+        if device.axes != 1:
+            raise ValueError(f"device.axes = {device.axes}: a batch steps devices with one axis")
         changes = epochs(device, period_s)
         self.ticks = max(1, round(duration_s / period_s))
         self.window = min(self.ticks, max(1, round(window_s / period_s)))
