@@ -43,6 +43,8 @@ def cases() -> list[Case]:
     shapes = set()
     for path in sorted(directory("config").glob("*.toml")):
         text = path.read_text()
+        if 'shape = "mesh"' in text:  # its field lies beside it, and a case is a text
+            continue
         if (shape := _shape(text)) not in shapes and _is_simulated(text):
             shapes.add(shape)
             found.append(Case("config", path.name, text))
