@@ -77,8 +77,8 @@ def run_loop(
         for owner, method, name in (
             (driver, "read", "read"),
             (driver, "write", "write"),
-            (tick, "step", "step"),
-            (shared.layout, "pack", "record"),
+            (tick, "advance", "step"),
+            (shared.layout, "pack_walls", "record"),
         ):
             if pieces:
                 setattr(owner, method, timed(getattr(owner, method), pieces[name]))
