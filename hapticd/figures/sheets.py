@@ -85,7 +85,8 @@ def draw(name: str, runs: Sequence[Curves], title: str = "") -> Figure:
         if title and len(runs) == 1:
             figure.suptitle(title, fontsize=8.5, fontweight="bold")
         elif title:  # beside the names of the runs there is no room for another line
-            figure.legends[0].set_title(title, {"weight": "bold", "size": 8.5})
+            figure.legends[0].set_title(title)
+            figure.legends[0].get_title().set(fontweight="bold", fontsize=8.5)
         return figure
 
 

@@ -23,7 +23,7 @@ def exact() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     def depth(_t: float, state: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
         return float(np.linalg.norm(state[:3])) - RADIUS_M
 
-    depth.terminal = True  # type: ignore[attr-defined]
+    depth.terminal = True  # type: ignore[attr-defined]  # SciPy reads it off the function
     state, now, inside = np.array([*START_M, *SPEED_M_PER_S]), 0.0, False
     events = 0
     while now < END_S:
@@ -35,7 +35,7 @@ def exact() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
             push = STIFFNESS_N_PER_M * (RADIUS_M - length) * z[:3] / length if inside else np.zeros(3)
             return np.concatenate([z[3:], push / MASS_KG])
 
-        depth.direction = 1 if inside else -1  # type: ignore[attr-defined]
+        depth.direction = 1 if inside else -1  # type: ignore[attr-defined]  # and this
         done = solve_ivp(rate, (now, END_S), state, events=depth, rtol=1e-12, atol=1e-14)
         state, now = done.y[:, -1], float(done.t[-1])
         if done.status == 1:
