@@ -103,24 +103,12 @@ def test_what_goes_wrong_is_named_soon_and_leaves_no_force(
     driver.close()
     record_property("ticks", ticks)
     record_property("peak_n", bench.first.peak_n_m / RADIUS_M)
+    print(f"| {name} | {ticks} | {bench.first.peak_n_m / RADIUS_M:.2f} |")  # noqa: T201 - the table of docs/moteus.md
 
 
-def test_the_table_of_reactions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What docs/moteus.md shows: measured here, over fdcanusb."""
-    monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
-    rows = []
-    for name, (happen, kind, text, most_ticks) in FAULTS.items():
-        with lab("fdcanusb", tmp_path, 2, monkeypatch) as made:
-            driver = pressing(made)
-            made.first.peak_n_m = 0.0
-            happen(made)
-            ticks = ticks_until(driver, kind, text)
-            driver.close()
-            rows.append(f"| {name} | {ticks} | {made.first.peak_n_m / RADIUS_M:.2f} |")
-            assert ticks <= most_ticks
-    print("\n".join(rows))  # noqa: T201 - the table
+def test_the_page_names_each_of_them() -> None:
     page = (Path(__file__).parents[3] / "docs" / "moteus.md").read_text()
-    assert all(row.rpartition("| ")[0].rsplit("|", 2)[0] in page for row in rows)
+    assert [name for name in FAULTS if f"| {name} |" not in page] == []
 
 
 def test_the_watchdog_that_goes_with_each_torque_is_the_one_that_is_declared(bench: Lab) -> None:

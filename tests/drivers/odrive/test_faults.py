@@ -130,6 +130,11 @@ def test_what_goes_wrong_is_named_soon_and_leaves_no_force(
     print(f"| {name} | {ticks} | {bench.first.peak_n_m / RADIUS_M:.2f} |")  # noqa: T201 - the table of docs/odrive.md
 
 
+def test_the_page_names_each_of_them() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "odrive.md").read_text()
+    assert [name for name in FAULTS if f"| {name} |" not in page] == []
+
+
 def test_the_watchdog_is_the_one_that_is_declared(bench: Lab) -> None:
     driver = pressing(bench)
     assert driver.info.host_silence_ms == WATCHDOG_MS
