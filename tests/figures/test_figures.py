@@ -129,6 +129,18 @@ def test_several_runs_are_told_apart_and_named(held: list[Curves]) -> None:
     assert len({(str(line.get_color()), str(panels.hand(at)["linestyle"])) for at, line in enumerate(named)}) == 14
 
 
+@pytest.mark.parametrize("name", ["run", "loop", "lateness", "fig9"])
+def test_a_title_and_the_names_of_runs_lie_apart(name: str, held: list[Curves]) -> None:
+    figure = draw(name, held, "a title")
+    encoded(figure, ".png")  # lays it out
+    legend = figure.legends[0]
+    if legend.get_title().get_text():
+        assert figure._suptitle is None  # type: ignore[attr-defined]
+    else:
+        title = next(text for text in figure.texts if text.get_text() == "a title")
+        assert not title.get_window_extent().overlaps(legend.get_window_extent())
+
+
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_a_figure_is_a_file_and_the_same_one_again(suffix: str, held: list[Curves], tmp_path: Path) -> None:
     path = tmp_path / f"run{suffix}"
