@@ -1,0 +1,51 @@
+"""What `hapticd watch` shows of a contact in space: which object, how deep, which way, and where."""
+
+from __future__ import annotations
+
+from hapticd.cli.watch.screen import frame, one_line
+from hapticd.cli.watch.space import direction, view
+from hapticd.cli.watch.state import ScreenState
+from hapticd.client import Damping, Position, Status, Touch
+
+STATUS = Status(axes=("x", "y", "z"), armed=True, object_name=("ball", "table"), object_shape=("sphere", "plane"))
+
+
+def touched() -> ScreenState:
+    known = ScreenState()
+    known.take([STATUS], 0.0)
+    for n in range(100):
+        at = (1e-4 * n, 0.0, 0.0298)
+        force = (1.2, 0.0, 2.4)
+        known.take([Position(0.01 * n, n, at, (0.0,) * 3, force, force)], 0.0)
+        known.take([Touch(0.01 * n, n, 0, (at[0], 0.0, 0.03), (0.0, 0.0, 1.0), 2e-4, force, True)], 0.0)
+    known.take([Damping(1.0, 99, (20.5, 0.0), (True, False), (0.0, 0.0))], 0.0)
+    return known
+
+
+def test_the_picture_names_the_object_its_depth_force_and_direction() -> None:
+    text = "\n".join(line.plain for line in frame(touched(), "ipc://here", 100, 40, 0.0))
+    assert "● ball           0.200 mm deep  pushes  2.68 N +z+x  damping 20.5 N s/m  sliding" in text
+    assert "from above" in text
+    assert "from the side" in text
+    assert "ball" in one_line(touched())
+
+
+def test_what_is_left_is_no_longer_shown() -> None:
+    known = touched()
+    known.take([Position(1.1, 110, (0.0, 0.0, 0.04), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)], 0.0)
+    assert "free of ball, table" in "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+
+
+def test_a_view_draws_the_way_and_an_arrow_where_it_pushes() -> None:
+    lines = [line.plain for line in view(touched().trail, 0, 2, 40, 9)]
+    drawn = "".join(lines)
+    assert len(lines) == 9
+    assert all(len(line) == 40 for line in lines)
+    assert "↗" in drawn
+    assert drawn.count("·") > 5
+
+
+def test_a_direction_is_told_by_its_largest_parts() -> None:
+    assert direction((0.0, 0.0, 3.0)) == "+z"
+    assert direction((-1.0, 0.1, 2.0)) == "+z-x"
+    assert direction((0.0, 0.0, 0.0)) == ""
