@@ -25,7 +25,7 @@ PACKAGES = {
 }
 SOURCES = {name: sorted(folder.rglob("*.py")) for name, folder in PACKAGES.items()}
 
-LONGEST_CHAIN = 14  # objects in space put two modules between assembling a tick and its contacts
+LONGEST_CHAIN = 12
 MOST_LINES = 28_000  # raised on purpose only, with what is new
 MOST_LINES_OF_A_MODULE = 400
 LARGEST_ROOM = 0.15

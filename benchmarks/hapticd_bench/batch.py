@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from hapticd import plugins
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.compiler.threads import cores
 from hapticd.simulation.options import SimulationOptions

@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from hapticd.config.loading import parse
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.errors import HapticdError
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory

@@ -16,7 +16,7 @@ from hapticd.client.commands import RefusedConfigError, command
 from hapticd.client.edited import put_into_force
 from hapticd.config.editing import with_law
 from hapticd.config.file import read, replace
-from hapticd.config.models import ControllerConfig
+from hapticd.config.plugin_tables import ControllerConfig
 from hapticd.config.problems import shown_value
 from hapticd.errors import ConfigError, InstanceError
 from hapticd.paths import CONTROL, DEFAULT_INSTANCE, SYSTEM_CONFIG, locate

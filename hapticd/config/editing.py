@@ -12,7 +12,7 @@ from tomlkit.container import Container
 from tomlkit.items import Comment, InlineTable, Null, Table, Whitespace
 
 from hapticd.config.loading import parse
-from hapticd.config.models import ControllerConfig
+from hapticd.config.plugin_tables import ControllerConfig
 from hapticd.config.values import put
 from hapticd.errors import ConfigError
 

@@ -13,8 +13,9 @@ from typing import Any, TypeVar
 
 from hapticd import plugins
 from hapticd.config.file import read
-from hapticd.config.models import Config, ControllerConfig, DeviceConfig
+from hapticd.config.models import Config
 from hapticd.config.objects import MeshObject
+from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig
 from hapticd.config.problems import Problems, nearest
 from hapticd.config.values import with_values
 from hapticd.driver import Driver, DriverOptions

@@ -1,4 +1,4 @@
-"""Every key of the configuration file, with its unit, bounds and meaning.
+"""The configuration file whole; every key has its unit, bounds and meaning, here or in the module of its table.
 
 Driver options and law parameters are kept as plain tables here; the driver's and the law's own models check
 them when the file is loaded (`hapticd.config.loading`).
@@ -8,21 +8,15 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from hapticd.config.objects import MAX_OBJECTS, ObjectConfig, check_names
+from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig
+from hapticd.config.safety import SafetyConfig
+from hapticd.config.walls import MAX_WALLS, WallConfig
 from hapticd.settings import Table
-
-MAX_WALLS = 8
-"""Most walls in a scene: the size of a tick record is fixed when the ring is made."""
-
-Axis = Literal["x", "y", "z"]
-
-MAX_CHANGES = 50
-"""Most changes of a wall over time: a running loop takes a wall over in the time between two ticks."""
 
 
 class LoopConfig(Table):
@@ -53,55 +47,6 @@ class LoopConfig(Table):
     def period_s(self) -> float:
         """Time between deadlines [s]."""
         return self.period_ns * 1e-9
-
-
-class DeviceConfig(Table):
-    """[device]: which driver, and its own options."""
-
-    driver: str = Field(
-        "loopback", min_length=1, description="installed driver or importable module, see `hapticd devices`"
-    )
-    options: dict[str, Any] = Field(default_factory=dict, description="the driver's own options")
-    accept_no_watchdog: bool = Field(
-        False,
-        description="run a real device that keeps its last force when this computer dies (docs/safety.md)",
-    )
-
-
-class WallChange(Table):
-    """One entry of scene.walls.changes: new values from some time on."""
-
-    at_s: float = Field(ge=0.0, description="seconds after the wall's first tick [s]")
-    stiffness_n_per_m: float | None = Field(None, ge=0.0, le=1e9, description="new stiffness [N/m]")
-    damping_n_s_per_m: float | None = Field(None, ge=-1e6, le=1e6, description="new damping [N s/m]")
-
-    @model_validator(mode="after")
-    def _changes_something(self) -> WallChange:
-        if self.stiffness_n_per_m is None and self.damping_n_s_per_m is None:
-            raise ValueError("must name a new stiffness_n_per_m or damping_n_s_per_m")
-        return self
-
-
-class WallConfig(Table):
-    """[[scene.walls]]: a plane across one axis that pushes towards its free side."""
-
-    axis: Axis = Field("z", description="axis that the plane is normal to")
-    free_side: Literal["positive", "negative"] = Field("positive", description="side of the plane that is free")
-    position_m: float = Field(0.0, ge=-10.0, le=10.0, description="where the plane is on the axis [m]")
-    stiffness_n_per_m: float = Field(ge=0.0, le=1e9, description="spring stiffness [N/m]")
-    damping_n_s_per_m: float = Field(
-        0.0, ge=-1e6, le=1e6, description="damping of the wall itself [N s/m]; negative makes the wall active"
-    )
-    changes: tuple[WallChange, ...] = Field(
-        (), max_length=MAX_CHANGES, description="changes of stiffness or damping over time, at most fifty"
-    )
-
-    @field_validator("changes")
-    @classmethod
-    def _changes_in_order(cls, changes: tuple[WallChange, ...]) -> tuple[WallChange, ...]:
-        if any(later.at_s <= earlier.at_s for earlier, later in pairwise(changes)):
-            raise ValueError("must be in order of at_s, each later than the one before")
-        return changes
 
 
 class SceneConfig(Table):
@@ -138,48 +83,6 @@ class VelocityConfig(Table):
         ge=0.0,
         le=0.1,
         description="foaw: error bound of a position [m]; unset: the device's resolution",
-    )
-
-
-class ControllerConfig(Table):
-    """[controller]: which law, and its own parameters."""
-
-    law: str = Field(
-        "energy-cycle",
-        min_length=1,
-        description="installed law or importable module, see `hapticd controllers`",
-    )
-    params: dict[str, Any] = Field(default_factory=dict, description="the law's own parameters")
-
-
-class SafetyConfig(Table):
-    """[safety]: what the guard allows."""
-
-    profile: Literal["device", "simulation"] = Field(
-        "device",
-        description="simulation lifts these limits, to what the device itself can do; only for simulated devices",
-    )
-    max_force_n: float | None = Field(
-        None, gt=0.0, le=1000.0, description="largest force magnitude [N]; unset: the device's own limit"
-    )
-    max_axis_force_n: float | None = Field(
-        None, gt=0.0, le=1000.0, description="largest force along one axis [N]; unset: as max_force_n"
-    )
-    max_speed_m_per_s: float | None = Field(
-        None,
-        gt=0.0,
-        le=100.0,
-        description="over-speed stop [m/s]; unset: 2 m/s on a real device, none on a simulated one",
-    )
-    ramp_s: float = Field(
-        0.05, ge=0.001, le=1.0, description="duration of every force ramp: arming, switch, release [s]"
-    )
-    auto_arm: bool = Field(False, description="arm a real device by itself at start and after it reconnects")
-    supervisor_stall_s: float = Field(
-        10.0,
-        ge=0.1,
-        le=3600.0,
-        description="release the force when the supervisor has been silent this long [s]",
     )
 
 

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from hapticd.config.models import ControllerConfig, DeviceConfig
+from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig
 from hapticd.config.problems import shown_value
 from hapticd.errors import ConfigError
 

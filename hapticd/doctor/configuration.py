@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from hapticd.config.file import read
 from hapticd.config.loading import LoadedConfig, load
-from hapticd.config.models import Config, DeviceConfig, LoopConfig
+from hapticd.config.models import Config, LoopConfig
+from hapticd.config.plugin_tables import DeviceConfig
 from hapticd.doctor.finding import Finding, ok, problem
 from hapticd.errors import ConfigError
 from hapticd.keys.policy import tcp_endpoints

@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from hapticd.config.models import LoopConfig, SafetyConfig
+from hapticd.config.models import LoopConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
 from hapticd.loop.memory import ANSWERED, DISARM, DISARMED, RECORDS, REQUESTS, SKIPPED, SUPERVISOR_BEAT, SharedMemory

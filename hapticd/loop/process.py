@@ -22,7 +22,7 @@ import msgpack
 
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig, parse
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
 from hapticd.loop.loop import ControlLoop

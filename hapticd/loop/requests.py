@@ -13,8 +13,10 @@ from types import ModuleType
 from typing import Any, cast
 
 from hapticd import plugins
-from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
+from hapticd.config.models import SceneConfig
 from hapticd.config.objects import OBJECT, MeshObject
+from hapticd.config.safety import SafetyConfig
+from hapticd.config.walls import WallConfig
 from hapticd.driver import DriverState
 from hapticd.errors import HapticdError
 from hapticd.loop.memory import DISARM, DISARMED_SINCE

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from enum import IntEnum
 from typing import Any
 
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.simulation.options import ConstantForce, RampForce, SimulationOptions, StepForce
 from hapticd.simulation.space_options import ConstantPush, HoldPath, LetGoPush, PressPush
 

@@ -6,18 +6,9 @@ import math
 
 from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.options import SimulationOptions
-from hapticd.simulation.plant import (
-    Buffers,
-    PlantParams,
-    PlantState,
-    delay_line,
-    epochs,
-    move,
-    recorded_points,
-    sense,
-    start_state,
-    terms,
-)
+from hapticd.simulation.plant.coefficients import delay_line, epochs, recorded_points, start_state, terms
+from hapticd.simulation.plant.state import Buffers, PlantParams, PlantState
+from hapticd.simulation.plant.step import move, sense
 
 
 class SimulatedDevice:

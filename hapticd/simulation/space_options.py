@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from hapticd.driver import DriverOptions
+from hapticd.settings import Table
 
 MAX_DELAY_SAMPLES = 128
 
@@ -21,14 +21,14 @@ Metres = Annotated[tuple[_Metre, ...], Field(min_length=2, max_length=3)]
 Positives = Annotated[tuple[Annotated[float, Field(ge=0.0, le=1e9)], ...], Field(min_length=2, max_length=3)]
 
 
-class ConstantPush(DriverOptions):
+class ConstantPush(Table):
     """The same force all the time."""
 
     profile: Literal["constant"] = "constant"
     newton: Newtons | None = Field(None, description="force along each axis; unset: none [N]")
 
 
-class PressPush(DriverOptions):
+class PressPush(Table):
     """A force that comes on along a straight line and stays."""
 
     profile: Literal["press"] = "press"
@@ -37,7 +37,7 @@ class PressPush(DriverOptions):
     duration_s: float = Field(0.1, ge=1e-6, le=1e9, description="how long it takes to come on [s]")
 
 
-class TapPush(DriverOptions):
+class TapPush(Table):
     """A force that comes and goes, smoothly, again and again; it starts released."""
 
     profile: Literal["tap"] = "tap"
@@ -46,7 +46,7 @@ class TapPush(DriverOptions):
     period_s: float = Field(0.5, ge=1e-6, le=1e9, description="time of one tap [s]")
 
 
-class StrokePush(DriverOptions):
+class StrokePush(Table):
     """A force that presses, and one that swings along the surface."""
 
     profile: Literal["stroke"] = "stroke"
@@ -55,7 +55,7 @@ class StrokePush(DriverOptions):
     frequency_hz: _Frequency = Field(0.5, description="strokes a second [Hz]")
 
 
-class LetGoPush(DriverOptions):
+class LetGoPush(Table):
     """A force that ends at once."""
 
     profile: Literal["let-go"] = "let-go"
@@ -69,14 +69,14 @@ Push = Annotated[
 ]
 
 
-class HoldPath(DriverOptions):
+class HoldPath(Table):
     """The hand aims at one point."""
 
     path: Literal["hold"] = "hold"
     at_m: Metres = Field(description="the point [m]")
 
 
-class LinePath(DriverOptions):
+class LinePath(Table):
     """The hand goes to and fro between two points, smoothly."""
 
     path: Literal["line"] = "line"
@@ -85,7 +85,7 @@ class LinePath(DriverOptions):
     period_s: float = Field(2.0, ge=1e-6, le=1e9, description="time there and back [s]")
 
 
-class CirclePath(DriverOptions):
+class CirclePath(Table):
     """The hand traces a circle about an axis."""
 
     path: Literal["circle"] = "circle"
@@ -98,7 +98,7 @@ class CirclePath(DriverOptions):
 Path = Annotated[HoldPath | LinePath | CirclePath, Field(discriminator="path")]
 
 
-class SpaceHand(DriverOptions):
+class SpaceHand(Table):
     """[device.options.space.hand]: force and impedance of the hand along each axis.
 
     A spring of the hand pulls towards `aim`; along one axis either the force or the aim may change in time.
@@ -111,7 +111,7 @@ class SpaceHand(DriverOptions):
     stiffness_n_per_m: Positives | None = Field(None, description="spring; unset: hand.stiffness_n_per_m [N/m]")
 
 
-class SpaceOptions(DriverOptions):
+class SpaceOptions(Table):
     """[device.options.space]: an element an axis, where one number for all of them is not enough."""
 
     mass_kg: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)] | None = Field(

@@ -17,7 +17,7 @@ import msgpack
 
 from hapticd import version
 from hapticd.config.loading import LoadedConfig
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.loop.memory import (

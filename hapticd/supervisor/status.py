@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.config.models import SafetyConfig, WallConfig
+from hapticd.config.safety import SafetyConfig
+from hapticd.config.walls import WallConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.loop.resume import ResumeState

@@ -24,8 +24,9 @@ from hapticd.law import (
     scalar_params,
     state_fields,
 )
+from hapticd.offline.rehearsal import rehearse
 from hapticd.simulation.compiler.lint import lint_law
-from hapticd.testing.law_press import press
+from hapticd.testing.law_scenario import pressed
 
 SEEDS = range(4)
 SEQUENCES = 24
@@ -114,7 +115,8 @@ class LawContract:
         """Tapped, drawn back and tapped again by the daemon's own tick, which must not fall back on another law."""
         for params in tried:
             table = params.model_dump(exclude_unset=True)
-            made = press(module.__name__, table, start_m=0.003, duration_s=1.0, device={"hand": {"force": _TAPPING}})
+            tapped = pressed(module.__name__, table, start_m=0.003, device={"hand": {"force": _TAPPING}})
+            made = rehearse(tapped, 1.0)
             assert made.fault is None, f"{params!r}: {made.fault}"
             outside = [force for x, force in zip(made.x_measured_m, made.force_n, strict=True) if not x < 0.0]
             assert 10 < len(outside) < len(made.force_n), "it was tapped and it was let go"

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import tomlkit
-
-from hapticd.config.loading import parse
 from hapticd.offline.run import Run
 from hapticd.offline.simulate import simulate
+from hapticd.testing.law_scenario import pressed
 
 
 def press(
@@ -42,11 +40,13 @@ def press(
         ConfigError: a law, a parameter or a value that a configuration could not have.
         DriverError: the device cannot be stepped at this rate.
     """
-    hand = {"force": {"profile": "constant", "newton": hand_n}}
-    tables = {
-        "loop": {"rate_hz": rate_hz},
-        "device": {"options": {"initial_position_m": start_m, "hand": hand, **(device or {})}},
-        "scene": {"walls": [{"stiffness_n_per_m": stiffness_n_per_m}]},
-        "controller": {"law": law, "params": dict(params or {})},
-    }
-    return simulate(parse(tomlkit.dumps(tables), "press"), duration_s)
+    loaded = pressed(
+        law,
+        params,
+        stiffness_n_per_m=stiffness_n_per_m,
+        hand_n=hand_n,
+        start_m=start_m,
+        rate_hz=rate_hz,
+        device=device,
+    )
+    return simulate(loaded, duration_s)

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from hapticd.config.models import SafetyConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hapticd.config.models import WallConfig
 from hapticd.config.timing import first_tick
+from hapticd.config.walls import WallConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 

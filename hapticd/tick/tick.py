@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 
-from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
+from hapticd.config.models import SceneConfig, VelocityConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo, Sample
 from hapticd.tick import fallback
 from hapticd.tick.arrangement import Arrangement, arrange

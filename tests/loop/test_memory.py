@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.device import Metric
 from hapticd.errors import HapticdError
 from hapticd.loop.memory import ANSWERED, DISARM, EVENTS, RECORDS, REQUESTS, EventReader, RecordReader, SharedMemory

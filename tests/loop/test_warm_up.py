@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from hapticd.config.models import SafetyConfig, VelocityConfig
+from hapticd.config.models import VelocityConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.loop.warm_up import TICKS, warm_up
 from hapticd.tick.guard import Guard, Mode
 from hapticd.tick.tick import ControlTick

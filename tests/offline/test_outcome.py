@@ -9,7 +9,7 @@ import pytest
 
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig, parse
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.offline.outcome import Criterion, Outcome, balance
 from hapticd.offline.presses import balance_m, judge, misplaced_m
 from hapticd.offline.simulate import simulate

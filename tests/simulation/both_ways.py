@@ -14,7 +14,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
+from hapticd.config.models import SceneConfig, VelocityConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.errors import DeviceFaultError
 from hapticd.law import LawTick, state_fields
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point

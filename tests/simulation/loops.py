@@ -7,7 +7,8 @@ import random
 from typing import Any, Literal
 
 from hapticd import plugins
-from hapticd.config.models import LoopConfig, WallConfig
+from hapticd.config.models import LoopConfig
+from hapticd.config.walls import WallConfig
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from tests.simulation import awkward_law

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from hapticd import plugins
-from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig, WallConfig
+from hapticd.config.models import SceneConfig, VelocityConfig
+from hapticd.config.safety import SafetyConfig
+from hapticd.config.walls import WallConfig
 from hapticd.errors import ConfigError, DeviceFaultError
 from hapticd.law import state_fields
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, BatchResult, Point

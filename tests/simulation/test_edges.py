@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from hapticd import plugins
 from hapticd.config.loading import parse
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.errors import ConfigError
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.device import SimulatedDevice

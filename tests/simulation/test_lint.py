@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 from hapticd import plugins
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.errors import PluginError
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.compiler.compile import compiled_step

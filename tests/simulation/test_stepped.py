@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd import plugins
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions

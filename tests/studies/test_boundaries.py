@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hapticd import plugins
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.simulation.batch import Batch, Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies import boundaries

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hapticd import plugins
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.offline.felt import JUST_FELT, WINDOW_S
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import aimed, judge

@@ -15,7 +15,7 @@ import pytest
 
 from hapticd.cli import main
 from hapticd.config.loading import parse
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.offline.felt import felt_index, threshold_m
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.simulate import simulate

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
+from hapticd.config.models import SceneConfig, VelocityConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo, Sample
 from hapticd.law import LawParams
 from hapticd.tick.contact import RunningLaw

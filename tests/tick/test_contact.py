@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.law import LawParams
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.scene import Wall

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.config.models import SafetyConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.tick.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, blended, start_blend

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.flags import Flag
 from hapticd.tick.record import RecordLayout, TickRecord

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.config.models import SceneConfig, WallConfig
+from hapticd.config.models import SceneConfig
+from hapticd.config.walls import WallConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.tick.scene import Wall, compile_walls

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.config.models import SafetyConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.errors import ConfigError
 from hapticd.law import LawParams
 from hapticd.simulation.device import SimulatedDevice

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hapticd.config.models import SafetyConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.errors import PluginError
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag

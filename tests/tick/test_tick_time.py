@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from hapticd import plugins
-from hapticd.config.models import SafetyConfig, VelocityConfig
+from hapticd.config.models import VelocityConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.device import Sample
 from hapticd.law import LawParams
 from hapticd.simulation.device import SimulatedDevice

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.config.models import SafetyConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.errors import ConfigError
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode

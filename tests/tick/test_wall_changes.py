@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.tick.scene import Wall
 from tests.tick.rig import PERIOD_S, Rig, scene, wall
 

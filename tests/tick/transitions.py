@@ -7,7 +7,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from hapticd.config.models import SafetyConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import BLIND_RAMP_S
 from tests.tick.rig import LIMIT_N, PERIOD_S, RAMP_TICKS, Rig, pushes, running, scene, wall

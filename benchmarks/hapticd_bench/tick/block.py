@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.errors import HapticdError
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory

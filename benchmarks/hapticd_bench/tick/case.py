@@ -7,7 +7,7 @@ import tomllib
 from dataclasses import dataclass
 
 from hapticd import plugins
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.paths import directory
 
 RATE_HZ = 1000.0

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterable
 
-from hapticd.config.models import SafetyConfig, SceneConfig, VelocityConfig
+from hapticd.config.models import SceneConfig, VelocityConfig
+from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo, Sample
 from hapticd.errors import ConfigError
 from hapticd.shapes.pose import Vector

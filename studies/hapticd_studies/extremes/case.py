@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.errors import ConfigError
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.boundaries import spring_limit

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from hapticd import plugins
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import judge
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point

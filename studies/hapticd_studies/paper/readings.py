@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.offline.outcome import Outcome
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions

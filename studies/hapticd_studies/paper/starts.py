@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.paper.runs import Array, Asked, Runs, law_named

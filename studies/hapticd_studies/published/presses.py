@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hapticd import plugins
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd.offline.felt import WINDOW_S, felt_index
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import aimed, judge

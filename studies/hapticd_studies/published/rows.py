@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticd.config.models import WallConfig
+from hapticd.config.walls import WallConfig
 from hapticd_studies.boundaries import Loop, is_stable, linear_limit, spring_limit, stable_limit
 from hapticd_studies.published.finding import Finding
 from hapticd_studies.published.presses import felt, points, settled

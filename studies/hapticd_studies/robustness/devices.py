@@ -10,7 +10,8 @@ from typing import Any
 
 import tomlkit
 
-from hapticd.config.models import LoopConfig, WallChange, WallConfig
+from hapticd.config.models import LoopConfig
+from hapticd.config.walls import WallChange, WallConfig
 from hapticd.law import LawParams
 from hapticd.offline.outcome import Criterion
 from hapticd.offline.presses import aimed

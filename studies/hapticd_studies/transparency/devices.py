@@ -12,7 +12,8 @@ from typing import Any
 
 import tomlkit
 
-from hapticd.config.models import LoopConfig, WallConfig
+from hapticd.config.models import LoopConfig
+from hapticd.config.walls import WallConfig
 from hapticd.law import LawParams
 from hapticd.simulation.options import Change, Hand, RecordedForce, SimulationOptions
 from hapticd_studies.boundaries import Loop, damper_peak, stable_limit

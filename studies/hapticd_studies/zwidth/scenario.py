@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import tomlkit
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.config.models import WallConfig
 from hapticd.config.values import put
+from hapticd.config.walls import WallConfig
 from hapticd.errors import ConfigError
 from hapticd.law import LawParams
 from hapticd.offline.outcome import Criterion, coulomb_n

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from hapticd.config.loading import parse
-from hapticd.config.models import MAX_WALLS
+from hapticd.config.walls import MAX_WALLS
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import EventReader, RecordReader, SharedMemory
 from hapticd.simulation.device import SimulatedDevice

@@ -12,8 +12,10 @@ from pydantic_core import PydanticUndefined
 
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig
-from hapticd.config.models import SafetyConfig, SceneConfig, WallConfig
+from hapticd.config.models import SceneConfig
 from hapticd.config.problems import allowed_range, unit_of
+from hapticd.config.safety import SafetyConfig
+from hapticd.config.walls import WallConfig
 from hapticd.errors import PluginError
 
 LIMITS = ("max_force_n", "max_axis_force_n", "max_speed_m_per_s", "ramp_s")
