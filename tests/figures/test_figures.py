@@ -135,7 +135,7 @@ def test_a_title_and_the_names_of_runs_lie_apart(name: str, held: list[Curves]) 
     encoded(figure, ".png")  # lays it out
     legend = figure.legends[0]
     if legend.get_title().get_text():
-        assert figure._suptitle is None  # type: ignore[attr-defined]
+        assert figure._suptitle is None  # type: ignore[attr-defined]  # matplotlib has no other way to ask
     else:
         title = next(text for text in figure.texts if text.get_text() == "a title")
         assert not title.get_window_extent().overlaps(legend.get_window_extent())
