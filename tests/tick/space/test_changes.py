@@ -51,6 +51,20 @@ def test_no_force_jumps_when_an_object_changes(after: str) -> None:
     assert rig.unbalanced_j() < 1e-13
 
 
+@pytest.mark.parametrize("moved_m", [0.03, -0.01])
+def test_a_part_of_a_union_that_moves_takes_its_surface_with_it(moved_m: float) -> None:
+    """Two balls are one solid; the second moves to the device or away from it, and the first stays."""
+    first = ball(position_m=(-0.05, 0.0, 0.0), radius_m=0.04)
+    rig = Rig(first + ball("other", position_m=(0.0, 0.0, -0.03), radius_m=0.04), "energy-cycle")
+    rig.start((0.0, 0.0, 0.031)).to((0.0, 0.0, 0.02), 60)
+    rig.switch(first + ball("other", position_m=(0.0, 0.0, moved_m - 0.03), radius_m=0.04))
+    for _ in range(3 * RAMP_TICKS):
+        rig.go((0.0, 0.0, 0.0095))
+    anew = Rig(first + ball("other", position_m=(0.0, 0.0, moved_m - 0.03), radius_m=0.04), "energy-cycle")
+    anew.start((0.0, 0.0, 0.08)).to((0.0, 0.0, 0.0095), 400).to((0.0, 0.0, 0.0095), 100)
+    assert apart(rig.force, anew.force) < 0.05 * max(1.0, abs(anew.force[2]))
+
+
 def test_an_object_goes_on_under_its_name_wherever_it_stands_in_the_file() -> None:
     rig = pressed(ball() + ball("other", position_m=(0.2, 0.0, 0.0)))
     contact = rig.tick.solids[0]
