@@ -25,7 +25,7 @@ from tests.daemon.running import Daemon, all_records, wait_until
 
 HAPTICD = Path(sys.executable).with_name("hapticd")
 CONFIG = directory("config")
-NEED_THEIR_DEVICE = {"hid-rig", "omega7", "serial-rig"}
+NEED_THEIR_DEVICE = {"hid-rig", "inverse3", "moteus", "odrive", "omega7", "serial-rig"}
 SHIPPED = sorted(file for file in CONFIG.glob("*.toml") if file.stem not in NEED_THEIR_DEVICE)
 WALL_12 = CONFIG / "wall-12-energy-cycle.toml"
 DIVERGING = """

@@ -120,7 +120,7 @@ def test_the_installed_units_have_no_fault(machine: Machine) -> None:
 def test_everything_is_installed_and_nothing_is_started(machine: Machine) -> None:
     done = machine.run("hapticd", "service", "status", check=False)
     states = [line.split()[0] for line in done.stdout.splitlines()]
-    assert states == ["installed"] * 5 + ["inactive"]
+    assert states == ["installed"] * 11 + ["inactive"]
     assert done.returncode == 1
 
 

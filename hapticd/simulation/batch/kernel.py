@@ -155,7 +155,7 @@ def run(
                 report(plant, loop)
             if TRACE:
                 traced = count - params.trace_from
-                if traced >= 0 and (traced + 1) % params.trace_every == 0:
+                if count >= params.trace_from and (traced + 1) % params.trace_every == 0:
                     record(plant, loop, ledger, trace, traced // params.trace_every)
         loop.ticks = segment.stop
 

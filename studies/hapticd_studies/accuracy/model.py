@@ -129,7 +129,7 @@ def _stepper(setting: Setting, reference: Run) -> tuple[Callable[[], object], Ca
     force_n = reference.columns["force_n"]
     for command_n in [0.0, *force_n][: fastest + 1]:
         device.advance(command_n)
-    state = vars(device)["_state"]
+    state = device.state
     x_m, v_m_per_s, command_n = state.x_m, state.v_m_per_s, force_n[fastest]
 
     def step() -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from decimal import MAX_EMAX, MIN_EMIN, Decimal, localcontext
 from functools import lru_cache
 from typing import NamedTuple
@@ -94,8 +95,10 @@ def growth(place: LoopCase, digits: int = 15) -> Decimal:
 def rounding(place: LoopCase) -> float:
     """How far the spectral radius moves when every coefficient of the polynomial is wrong in its last digits.
 
-    To first order a root z moves by the sum of errors e |c_i z^i| over |p'(z)|. e: a rounding of a double for each
-    operation that a coefficient is made of, about 64 and one more for each state.
+    And when mass or spring of the hand are: a hand that swings thousands of times a period has a phase whose last digit
+    is thousands of times that of its frequency. To first order a root z moves by the sum of errors e |c_i z^i| over
+    |p'(z)|. e: a rounding of a double for each operation that a coefficient is made of, about 64 and one more for each
+    state.
     """
     coefficients = np.array([float(value) for value in _polynomial(place, 40)])
     roots = np.roots(coefficients)
@@ -103,7 +106,20 @@ def rounding(place: LoopCase) -> float:
     slopes = np.abs(np.polyval(np.polyder(coefficients), roots))
     each = np.polyval(np.abs(coefficients), sizes) / np.maximum(slopes, np.finfo(float).tiny)
     outermost = sizes >= (1.0 - 1e-6) * sizes.max()
-    return float((64.0 + len(coefficients)) * np.finfo(float).eps * each[outermost].max())
+    roundings = 64.0 + len(coefficients)
+    return float(roundings * (np.finfo(float).eps * each[outermost].max() + _moved_by_a_digit(place)))
+
+
+def _moved_by_a_digit(place: LoopCase) -> float:
+    """How far the spectral radius moves with the last digit of the mass and of the hand's spring."""
+    if not place.hand_stiffness_n_per_m:
+        return 0.0
+    nudged = (
+        replace(place, mass_kg=math.nextafter(place.mass_kg, math.inf)),
+        replace(place, hand_stiffness_n_per_m=math.nextafter(place.hand_stiffness_n_per_m, math.inf)),
+    )
+    here = growth(place, 25)
+    return float(sum(abs(growth(one, 25) - here) for one in nudged))
 
 
 @lru_cache(maxsize=1024)

@@ -23,7 +23,13 @@ PRESS_N = 1.0
 START_M = 0.002
 HELD_TICKS = 1000
 STILL_M = 2e-5
-BUSY = {EventCode.LOOP_LATE, EventCode.DEVICE_FROZEN, EventCode.DEVICE_LOST, EventCode.DEVICE_FAULT}
+BUSY = {
+    EventCode.LOOP_LATE,
+    EventCode.DEVICE_FROZEN,
+    EventCode.DEVICE_LOST,
+    EventCode.DEVICE_FAULT,
+    EventCode.OVER_SPEED,  # a handle that drifted off while it was let go is put back in one tick
+}
 """What this computer brings about when it has no time for the loop or for the motors."""
 
 ATTEMPTS = 5
