@@ -22,7 +22,7 @@ class DriverTrace:
     """The last entries, each with its time.
 
     Args:
-        size: how many are kept, at most `MOST_ENTRIES`.
+        size: how many are kept, at most `MOST_ENTRIES`; 0: none.
     """
 
     def __init__(self, size: int = 0) -> None:
@@ -37,6 +37,8 @@ class DriverTrace:
 
     def keep(self, *parts: object) -> None:
         """Add an entry, from any thread; what does not fit into its slot is cut."""
+        if not self._size:
+            return
         text = " ".join(map(str, parts)).encode(errors="replace")[:366]
         number = next(self._numbers)
         at = number % self._size * _ENTRY.size

@@ -41,5 +41,7 @@ def test_threads_lose_no_entry_to_each_other() -> None:
     assert said == {f"{name} {number}" for name in range(4) for number in range(1000)}
 
 
-def test_the_trace_of_a_driver_without_one_is_empty() -> None:
-    assert DriverTrace().lines() == []
+def test_a_driver_without_the_option_may_keep_what_it_likes_and_nothing_is_kept() -> None:
+    trace = DriverTrace()
+    trace.keep("> 01")
+    assert trace.lines() == []

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import select
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import serial
-
-from hapticd.errors import DeviceDisconnectedError
 from hapticd_drivers.motors.link import Frame
-from hapticd_drivers.serial_port import open_tty
+from hapticd_drivers.serial_port import SerialPort
 
 BAUD = 921_600
 """Of no meaning to an adapter that is USB itself."""
@@ -61,37 +55,23 @@ class AsciiLink:
     def __init__(self, driver: str, path: str, dialect: Dialect) -> None:
         self.where = path
         self.damaged = 0
-        self.unsent = 0
-        self._driver = driver
         self._dialect = dialect
-        self._rest = b""  # of a line that has gone out in part
         self._came = b""  # of a line that has not come whole
-        self._port = open_tty(driver, path, BAUD, f"the {dialect.name} adapter")
-        self._descriptor: int = self._port.fileno()
-        self._write(dialect.opening)
+        self._port = SerialPort(driver, path, BAUD, f"the {dialect.name} adapter")
+        self._port.send(dialect.opening)
+
+    @property
+    def unsent(self) -> int:
+        """Frames so far that were dropped because the port could take no more."""
+        return self._port.unsent
 
     def send(self, identifier: int, data: bytes) -> None:
         """Send a frame, or drop it when the port can take no more."""
-        if self._rest:
-            self._rest = self._rest[self._write(self._rest) :]
-            if self._rest:
-                self.unsent += 1
-                return
-        line = self._dialect.line(identifier, data)
-        written = self._write(line)
-        if written == 0:
-            self.unsent += 1
-        elif written < len(line):
-            self._rest = line[written:]
+        self._port.send(self._dialect.line(identifier, data))
 
     def receive(self) -> list[Frame]:
         """The frames that have come."""
-        try:
-            data = os.read(self._descriptor, MOST_BYTES)
-        except BlockingIOError:
-            return []
-        except OSError as error:
-            raise self._gone(error) from None
+        data = self._port.receive(MOST_BYTES)
         if not data:
             return []
         dialect = self._dialect
@@ -113,24 +93,8 @@ class AsciiLink:
 
     def wait(self, timeout_s: float) -> None:
         """Return when something may have come, or after this time [s]."""
-        select.select([self._descriptor], [], [], timeout_s)
+        self._port.wait(timeout_s)
 
     def close(self) -> None:
         """Give it back."""
-        with contextlib.suppress(DeviceDisconnectedError):
-            self._write(self._dialect.closing)
-        with contextlib.suppress(OSError, serial.SerialException):
-            self._port.close()
-
-    def _write(self, data: bytes) -> int:
-        try:
-            return os.write(self._descriptor, data)
-        except BlockingIOError:
-            return 0
-        except OSError as error:
-            raise self._gone(error) from None
-
-    def _gone(self, error: OSError) -> DeviceDisconnectedError:
-        return DeviceDisconnectedError(
-            f"{self._driver}: {self.where} is gone, unplugged perhaps ({error.strerror}): plug it in again"
-        )
+        self._port.close(self._dialect.closing)

@@ -23,12 +23,14 @@ class BusLink(Protocol):
     Attributes:
         where: the port or interface, for people.
         damaged: what has come so far and was no frame.
-        unsent: frames so far that were dropped since the adapter could take no more.
     """
 
     where: str
     damaged: int
-    unsent: int
+
+    @property
+    def unsent(self) -> int:
+        """Frames so far that were dropped because the adapter could take no more."""
 
     def send(self, identifier: int, data: bytes) -> None:
         """Send a frame, or drop it when the adapter can take no more.

@@ -1,22 +1,16 @@
-"""A serial line as a link: opened by pyserial, then read and written directly, since a tick must never wait.
-
-pyserial's own `write` tries again and again while the line takes no more, even when told not to wait.
-"""
+"""A serial line as a link: frames on a port, and what makes kernel and adapter hand bytes over at once."""
 
 from __future__ import annotations
 
 import contextlib
-import os
-import select
 import termios
 from pathlib import Path
 
 import serial
 
-from hapticd.errors import DeviceDisconnectedError
 from hapticd_drivers.rig.frames import FrameReader, framed
 from hapticd_drivers.rig.serial_ports import Port, latency_timer
-from hapticd_drivers.serial_port import open_tty
+from hapticd_drivers.serial_port import SerialPort
 
 MOST_BYTES = 4096
 """Most that is read at once: more than a line brings in 10 ms."""
@@ -36,13 +30,10 @@ class SerialLink:
 
     def __init__(self, port: Port, baud: int, low_latency: bool) -> None:
         self.where = port.path
-        self._unsent = 0
         self._reader = FrameReader()
-        self._rest = b""  # of a frame that has gone out in part
-        self._port = open_tty("serial-rig", port.path, baud, "the rig")
-        self._descriptor: int = self._port.fileno()
-        _keep_up(self._descriptor)
-        self.notes = _hurry(self._port) if low_latency else ()
+        self._port = SerialPort("serial-rig", port.path, baud, "the rig")
+        _keep_up(self._port.descriptor)
+        self.notes = _hurry(self._port.port) if low_latency else ()
 
     @property
     def damaged(self) -> int:
@@ -52,51 +43,24 @@ class SerialLink:
     @property
     def unsent(self) -> int:
         """Messages so far that were dropped because the line could take no more."""
-        return self._unsent
+        return self._port.unsent
 
     def send(self, message: bytes) -> None:
         """Send a message, or drop it when the line can take no more."""
-        if self._rest:
-            self._rest = self._rest[self._write(self._rest) :]
-            if self._rest:
-                self._unsent += 1
-                return
-        frame = framed(message)
-        written = self._write(frame)
-        if written == 0:
-            self._unsent += 1
-        elif written < len(frame):
-            self._rest = frame[written:]
+        self._port.send(framed(message))
 
     def receive(self) -> list[bytes]:
         """The intact messages that have come."""
-        try:
-            data = os.read(self._descriptor, MOST_BYTES)
-        except BlockingIOError:
-            return []
-        except OSError as error:
-            raise self._gone(error) from None
+        data = self._port.receive(MOST_BYTES)
         return self._reader.feed(data) if data else []
 
     def wait(self, timeout_s: float) -> None:
-        """Return when something may have come, or after so long [s]."""
-        select.select([self._descriptor], [], [], timeout_s)
+        """Return when something may have come, or after this time [s]."""
+        self._port.wait(timeout_s)
 
     def close(self) -> None:
         """Give it back."""
-        with contextlib.suppress(OSError, serial.SerialException):
-            self._port.close()
-
-    def _write(self, data: bytes) -> int:
-        try:
-            return os.write(self._descriptor, data)
-        except BlockingIOError:
-            return 0
-        except OSError as error:
-            raise self._gone(error) from None
-
-    def _gone(self, error: OSError) -> DeviceDisconnectedError:
-        return DeviceDisconnectedError(f"serial-rig: {self.where} is gone, unplugged perhaps ({error.strerror})")
+        self._port.close()
 
 
 def _keep_up(descriptor: int) -> None:

@@ -146,7 +146,7 @@ def test_a_line_that_takes_no_more_loses_whole_messages_and_never_makes_one_wait
 
 def test_a_closed_port_leaves_dtr_up_so_that_the_next_to_open_it_resets_no_board(line: tuple[int, Port]) -> None:
     link = SerialLink(line[1], 1_000_000, low_latency=False)
-    assert not termios.tcgetattr(link._descriptor)[2] & termios.HUPCL
+    assert not termios.tcgetattr(link._port.descriptor)[2] & termios.HUPCL
     link.close()
 
 
