@@ -8,10 +8,13 @@ from typing import Annotated
 
 import typer
 
-from hapticd.config.loading import load
+from hapticd.config.loading import LoadedConfig, load
 from hapticd.errors import ConfigError
 from hapticd.keys.policy import key_ring
 from hapticd.offline.model_choice import fit
+from hapticd.offline.rehearsal import Rehearsal
+from hapticd.simulation.driver import SimulatedDriver
+from hapticd.simulation.options import SimulationOptions
 
 
 def check(
@@ -33,6 +36,7 @@ def check(
             loaded = load(file)
             key_ring(loaded)
             found = fit(loaded)
+            _put_together(loaded)
         except ConfigError as error:
             verdict |= {"ok": False, "problems": error.problems}
             problems += error.problems
@@ -52,3 +56,18 @@ def check(
         typer.echo(problem, err=True)
     if problems:
         raise typer.Exit(ConfigError.exit_code)
+
+
+def _put_together(loaded: LoadedConfig) -> None:
+    """Make the tick on a simulated device; a real one says only when it is open what axes and limits it has.
+
+    Raises:
+        ConfigError: the scene or the limits do not fit the device.
+    """
+    options = loaded.options
+    if (
+        isinstance(options, SimulationOptions)
+        and issubclass(loaded.driver, SimulatedDriver)
+        and options.clock == "ticks"
+    ):
+        Rehearsal(loaded)

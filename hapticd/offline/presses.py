@@ -26,6 +26,8 @@ def point_of(loaded: LoadedConfig) -> Point:
         raise ConfigError(f'{name}: device.driver = "{config.device.driver}": only a simulated device, try "loopback"')
     if len(config.scene.walls) != 1:
         raise ConfigError(f"{name}: scene.walls: has {len(config.scene.walls)} walls; a map needs one")
+    if config.scene.objects:
+        raise ConfigError(f"{name}: scene.objects: a map knows walls only")
     if config.velocity.estimator != "difference":
         raise ConfigError(f'{name}: velocity.estimator = "{config.velocity.estimator}": a map needs "difference"')
     if not pressing_n(device) > 0.0:

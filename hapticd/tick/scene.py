@@ -6,8 +6,9 @@ damping, one without changes looks at no clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+from hapticd.config.objects import ObjectConfig
 from hapticd.config.timing import first_tick
 from hapticd.config.walls import WallConfig
 from hapticd.device import DeviceInfo
@@ -118,6 +119,18 @@ class Wall:
     def same_place(self, other: Wall) -> bool:
         """Whether the two planes coincide, so that one may turn into the other under a hand."""
         return self.position_m == other.position_m and self.axis == other.axis and self.outward == other.outward
+
+
+def check_objects(objects: Sequence[ObjectConfig], info: DeviceInfo) -> None:
+    """Refuse objects on a device that is not in space.
+
+    Raises:
+        ConfigError: it has fewer than three axes.
+    """
+    if objects and len(info.axes) < 3:
+        raise ConfigError(
+            f'scene.objects[0] "{objects[0].name}": objects need three axes, and {info.model} has {len(info.axes)}'
+        )
 
 
 def compile_walls(walls: Iterable[WallConfig], info: DeviceInfo, period_s: float) -> list[Wall]:

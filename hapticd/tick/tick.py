@@ -21,7 +21,7 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
 from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, let_out, limits
 from hapticd.tick.motion import Motion
-from hapticd.tick.scene import compile_walls
+from hapticd.tick.scene import check_objects, compile_walls
 
 _IMPOSSIBLE = "the device reported a position that is not possible"
 _LOST = "the device does not know any more where it is"
@@ -68,6 +68,7 @@ class ControlTick:
         period_s: float,
         ramp_s: float,
     ) -> None:
+        check_objects(scene.objects, info)
         axes = len(info.axes)
         self.info = info
         self.motion = Motion(velocity, info, period_s)
@@ -181,6 +182,7 @@ class ControlTick:
         make = self.make_law if make_law is None else make_law
         there = Arrangement(self.contacts)
         if scene is not None:
+            check_objects(scene.objects, self.info)
             walls = compile_walls(scene.walls, self.info, self.period_s)
             yield
             there = yield from arrange(walls, self.contacts, self.info, make)

@@ -229,6 +229,30 @@ def test_check_of_good_files_succeeds() -> None:
     assert (done.returncode, done.stderr, len(done.stdout.splitlines())) == (0, "", len(files))
 
 
+@pytest.mark.parametrize("command", ["check", "run", "simulate"])
+def test_an_object_on_a_device_with_one_axis_is_refused_by_name(tmp_path: Path, command: str) -> None:
+    """It must not run without the object, as if there were nothing there."""
+    file = tmp_path / "ball.toml"
+    file.write_text('[[scene.objects]]\nname = "ball"\nshape = "sphere"\nradius_m = 0.03\nstiffness_n_per_m = 9e3\n')
+    arguments: dict[str, list[str | Path]] = {
+        "check": ["check", file],
+        "run": ["run", "--config", file],
+        "simulate": ["simulate", "--config", file, "--duration", "0.1"],
+    }
+    done = hapticd(*arguments[command])
+    assert done.returncode == 2
+    assert f'{file}: scene.objects[0] "ball": objects need three axes, and loopback (omega7 model) has 1' in done.stderr
+
+
+def test_check_puts_a_simulated_device_and_its_scene_together(tmp_path: Path) -> None:
+    file = tmp_path / "walls.toml"
+    walls = "".join(f'[[scene.walls]]\naxis = "{axis}"\nstiffness_n_per_m = 9e3\n' for axis in "xy")
+    file.write_text(walls)
+    done = hapticd("check", file)
+    assert done.returncode == 2
+    assert 'scene.walls[1].axis = "y": loopback (omega7 model) has a single axis' in done.stderr
+
+
 # -- config, devices, controllers
 
 

@@ -45,6 +45,13 @@ def test_a_view_draws_the_way_and_an_arrow_where_it_pushes() -> None:
     assert drawn.count("·") > 5
 
 
+def test_a_view_before_the_first_position_is_empty_but_for_the_device() -> None:
+    known = ScreenState()
+    known.take([STATUS], 0.0)
+    assert "".join(line.plain for line in view(known.trail, 0, 1, 40, 9)).strip() == "●"
+    assert frame(known, "ipc://here", 100, 40, 0.0)
+
+
 def test_a_direction_is_told_by_its_largest_parts() -> None:
     assert direction((0.0, 0.0, 3.0)) == "+z"
     assert direction((-1.0, 0.1, 2.0)) == "+z-x"

@@ -98,12 +98,9 @@ def view(trail: Trail, across: int, up: int, width: int, height: int) -> list[Te
     here = trail.points[-1] if trail.points else (0.0, 0.0, 0.0)
     shown = [*trail.points, *(touch.proxy_m for touch in trail.touches)]
     middle = [0.5 * (min(at) + max(at)) for at in _columns(shown or [here], (across, up))]
-    reach_m = max(
-        _LEAST_M,
-        *(abs(point[across] - middle[0]) for point in shown),
-        *(abs(point[up] - middle[1]) * width / (_TALL * height) for point in shown),
-    )
-    reach_m = _rounded(reach_m)
+    aside_m = [abs(point[across] - middle[0]) for point in shown]
+    above_m = [abs(point[up] - middle[1]) * width / (_TALL * height) for point in shown]
+    reach_m = _rounded(max([_LEAST_M, *aside_m, *above_m]))
     cells = [[(" ", "")] * width for _ in range(height)]
 
     def put(point: Point, mark: str, style: str) -> None:

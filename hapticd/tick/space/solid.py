@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from hapticd.config.objects import BoxObject, CapsuleObject, CylinderObject, MeshObject, ObjectConfig, SphereObject
-from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.shapes.field import Field
 from hapticd.shapes.pose import Pose
@@ -147,16 +146,12 @@ def _field(file: Path, _changed_ns: int, _size: int) -> Field:
         raise ConfigError(f"file = {file}: {error}") from None
 
 
-def compile_objects(objects: Sequence[ObjectConfig], info: DeviceInfo, period_s: float) -> list[Solid]:
-    """The solids of a scene on a device, in the order of their first objects.
+def compile_objects(objects: Sequence[ObjectConfig], period_s: float) -> list[Solid]:
+    """The solids of a scene, in the order of their first objects.
 
     Raises:
-        ConfigError: objects on a device with fewer than three axes, or a shape that is not possible.
+        ConfigError: a shape that is not possible.
     """
-    if objects and len(info.axes) < 3:
-        raise ConfigError(
-            f'scene.objects[0] "{objects[0].name}": objects need three axes, and {info.model} has {len(info.axes)}'
-        )
     shapes = []
     for index, config in enumerate(objects):
         try:

@@ -51,7 +51,7 @@ class SpaceTick(ControlTick):
     ) -> None:
         super().__init__(scene, velocity, guard, info, make_law, period_s, ramp_s)
         self.solids = [
-            SolidContact(solid, make_law, info.resolution_m) for solid in compile_objects(scene.objects, info, period_s)
+            SolidContact(solid, make_law, info.resolution_m) for solid in compile_objects(scene.objects, period_s)
         ]
         self.objects = len(scene.objects)
         self.awake: list[SolidContact] = []
@@ -91,7 +91,7 @@ class SpaceTick(ControlTick):
         fading: list[tuple[SolidContact, list[tuple[Contact, RunningLaw]]]] = []
         new: list[SolidContact] = []
         if scene is not None:
-            solids = compile_objects(scene.objects, self.info, self.period_s)
+            solids = compile_objects(scene.objects, self.period_s)
             yield
             known = {contact.solid.name: contact for contact in self.solids}
             there = []

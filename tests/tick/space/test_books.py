@@ -33,7 +33,7 @@ def wander(seed: int, ticks: int, start: Point) -> list[Point]:
     points = []
     for _ in range(ticks):
         for axis in range(3):
-            way[axis] += draw.gauss(0.0, 3e-5) - 0.05 * way[axis] - 1e-3 * (at[axis] - 0.6 * start[axis])
+            way[axis] += draw.gauss(0.0, 3e-5) - 0.05 * way[axis] - 1e-3 * (at[axis] - 0.4 * start[axis])
             at[axis] += way[axis]
         points.append((at[0], at[1], at[2]))
     return points

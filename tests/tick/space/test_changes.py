@@ -8,6 +8,7 @@ import math
 import pytest
 
 from hapticd.errors import ConfigError
+from hapticd.tick.assemble import make_tick
 from hapticd.tick.contact import RunningLaw
 from tests.tick.space import passing_fault
 from tests.tick.space.rig import INFO, Rig, apart, ball, config, table
@@ -137,3 +138,13 @@ def test_an_object_that_swallows_the_start_is_refused_before_any_force() -> None
     with pytest.raises(ConfigError) as refused:
         Rig(ball(), info=info)
     assert str(refused.value) == 'bench: scene.objects[0] "ball": swallows the device, which starts 1 mm inside it'
+
+
+def test_a_device_with_one_axis_takes_no_object_over() -> None:
+    wall = "[[scene.walls]]\nstiffness_n_per_m = 9000.0\n"
+    one = dataclasses.replace(INFO, axes=("z",), workspace_m=INFO.workspace_m[:1])
+    tick = make_tick(config(wall), one)
+    scene = config(wall + ball()).config.scene
+    with pytest.raises(ConfigError, match="objects need three axes, and bench has 1"):
+        list(tick.switch(scene))
+    assert len(tick.contacts) == 1
