@@ -1,7 +1,7 @@
 """Those that look at a daemon at the same time: subscribers, and a page of the dashboard, all in one process.
 
-They read every message and count what they miss. Whoever looks at one daemon from one process shares its interpreter,
-so that their processor time is that of one program, and not of fifteen.
+They read every message and count what they miss. In one process they share its interpreter, so that their processor
+time is that of one program, and not of fifteen.
 """
 
 from __future__ import annotations

@@ -124,7 +124,7 @@ def measure(config: Path, duration_s: float, progress: Progress) -> Viewers:
 
 
 class _Observer:
-    """Reads the timing of every tick, whoever else looks."""
+    """Reads the timing of every tick, with viewers and without."""
 
     def __init__(self, client: Client, daemon: RunningDaemon, period_ns: int, progress: Progress) -> None:
         self.lost = 0

@@ -137,8 +137,8 @@ def streams(root: Path = ROOT) -> Finding:
         return ok("no Lab Streaming Layer stream is open to other computers")
     first, last = LSL_PORTS[0], LSL_PORTS[-1]
     return advice(
-        f"Lab Streaming Layer listens on every address, unencrypted, port {', '.join(map(str, listening))}: whoever "
-        "reaches this computer can read its streams, and liblsl cannot be told otherwise",
+        f"Lab Streaming Layer listens on every address, unencrypted, port {', '.join(map(str, listening))}: any "
+        "program that reaches this computer can read its streams, and liblsl has no setting against that",
         f"sudo ss -ltnp 'sport >= :{first} and sport <= :{last}'  # whose; end it, or keep others out with a firewall",
     )
 

@@ -169,7 +169,7 @@ class MoteusCrew(Crew):
         while not all(motor.mode == TIMED_OUT for motor in self._motors):
             if time.monotonic() > end_s:
                 raise DeviceFaultError(
-                    f"{self._name}: a controller on {self.link.where} goes on when it is told nothing for "
+                    f"{self._name}: a controller on {self.link.where} goes on without a command for "
                     f"{1e3 * self._watchdog_s:g} ms: update its firmware"
                 )
             self.ask()

@@ -21,7 +21,7 @@ from hapticd_drivers.motors.metrics import (
 
 URGENT_S = 0.005
 URGENT_PATIENCE_S = 0.04
-"""A motor is told anew after this time, and counts as silent after that one, since a loop waits for it [s]."""
+"""A command is repeated after the first time, and a motor counts as silent after the second: a loop waits [s]."""
 
 GREETING_S = 0.05
 GREETING_PATIENCE_S = 1.0

@@ -11,7 +11,7 @@ from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.rig.motion import Moment
 
 COUNTS_PER_TURN = 1 << 20
-"""In which a place is told: finer than any encoder."""
+"""Resolution of the places that a movement is given: finer than any encoder."""
 
 ANSWER_S = 0.05
 MOST_TRIPS = 10

@@ -14,8 +14,9 @@ from hapticd.paths import DEFAULT_INSTANCE
 from hapticd_views.commands.signals import stop_signals
 
 WARNING = (
-    "warning  LSL listens on all addresses of this computer and encrypts nothing: whoever reaches it can read these\n"
-    "         streams. liblsl cannot be told otherwise; keep others out with a firewall on its ports, 16571 to 16604."
+    "warning  LSL listens on all addresses of this computer and encrypts nothing: any program that reaches it can\n"
+    "         read these streams. liblsl has no setting against that; keep others out with a firewall on its ports,\n"
+    "         16571 to 16604."
 )
 
 
