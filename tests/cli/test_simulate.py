@@ -20,13 +20,10 @@ from hapticd.offline import traces
 from hapticd.offline.run import Row
 from hapticd.offline.simulate import simulate as run_offline
 from hapticd.offline.traces import open_trace
-from hapticd.paths import directory
 from tests.daemon.running import Daemon, all_records, wait_until
+from tests.shipped import CONFIG, SIMULATED
 
 HAPTICD = Path(sys.executable).with_name("hapticd")
-CONFIG = directory("config")
-NEED_THEIR_DEVICE = {"hid-rig", "inverse3", "moteus", "odrive", "omega7", "serial-rig"}
-SHIPPED = sorted(file for file in CONFIG.glob("*.toml") if file.stem not in NEED_THEIR_DEVICE)
 WALL_12 = CONFIG / "wall-12-energy-cycle.toml"
 DIVERGING = """
 [device.options]
@@ -113,7 +110,7 @@ def test_the_numbers_are_the_daemons_to_the_last_bit() -> None:
         ), seq
 
 
-@pytest.mark.parametrize("config", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.parametrize("config", SIMULATED, ids=lambda path: path.stem)
 def test_every_shipped_configuration_runs_and_runs_the_same_again(config: Path) -> None:
     first = rows(config, 0.5)
     assert len(first) == 500

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from hapticd.cli.watch.screen import frame, one_line
 from hapticd.cli.watch.space import direction, view
 from hapticd.cli.watch.state import ScreenState
@@ -34,6 +36,23 @@ def test_what_is_left_is_no_longer_shown() -> None:
     known = touched()
     known.take([Position(1.1, 110, (0.0, 0.0, 0.04), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)], 0.0)
     assert "free of ball, table" in "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+
+
+def test_a_batch_of_positions_that_comes_first_lets_go_of_nothing() -> None:
+    known = touched()
+    for n in range(100, 120):
+        known.take([Position(0.99 + 1e-3 * (n - 99), n, (0.0, 0.0, 0.0298), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)], 0.0)
+    text = "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+    assert "free of" not in text
+    assert "● ball" in text
+
+
+@pytest.mark.parametrize("width", [80, 100, 140])
+def test_every_axis_is_read_at_any_width(width: int) -> None:
+    (line, *_) = [line.plain for line in frame(touched(), "ipc://here", width, 40, 0.0) if " position " in line.plain]
+    for axis in "xyz":
+        assert line.count(f"{axis} +") == 2, line
+    assert "…" not in line
 
 
 def test_a_view_draws_the_way_and_an_arrow_where_it_pushes() -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import math
+import subprocess
 import time
 
 import pytest
 
 from hapticd.offline.simulate import simulate
 from hapticd.paths import directory
-from tests.daemon.running import Daemon, Subscriber, all_records
+from tests.daemon.running import HAPTICD, Daemon, Subscriber, all_records, wait_until
 from tests.offline.space_presses import KINDS, STILL_M, press_text
 
 CONFIG = directory("config")
@@ -34,6 +35,19 @@ def test_the_daemon_is_the_offline_run_to_the_last_bit(name: str) -> None:
         assert record.position_m == tuple(rows[f"measured_{axis}_m"][at] for axis in "xyz"), at
         assert record.force_n == tuple(rows[f"force_{axis}_n"][at] for axis in "xyz"), at
         assert record.energy_j == rows["energy_j"][at], at
+
+
+def test_the_live_view_of_a_running_daemon_names_what_is_touched() -> None:
+    """The hand begins to press after a while, and lets go again: some picture must show it."""
+    with Daemon((CONFIG / "ball.toml").read_text()) as daemon:
+        daemon.wait_ready()
+
+        def shown() -> bool:
+            command = [HAPTICD, "watch", "--once", "--connect", daemon.endpoint]
+            picture = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+            return "● ball" in picture and "mm deep" in picture
+
+        wait_until(shown, "the ball in the live view")
 
 
 def test_what_is_touched_is_told() -> None:

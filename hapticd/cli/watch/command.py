@@ -37,7 +37,7 @@ _PATIENCE_S = 3.0  # for a daemon, when one answer is all that was asked for
 _GATHER_S = 1.0  # what a single picture shows of its traces
 _KEEP_S = 4.0  # what a kept picture shows
 _LOOK_AGAIN_S = 1.0  # a daemon may come up elsewhere than where this one first looked
-_SHOWN = ("position", "energy", "damping", "cycle", "event", "status")
+_SHOWN = ("position", "energy", "damping", "contact", "cycle", "event", "status")
 
 
 def watch(

@@ -227,7 +227,7 @@ def _plots(known: ScreenState, status: Status, width: int, height: int) -> list[
 def _position_box(known: ScreenState, status: Status, width: int, height: int) -> list[Text]:
     assert known.position is not None
     axes = _axes(status, known.position)
-    titles = [f"{name} {1e3 * value:+.3f}" for name, value in zip(axes, known.position.position_m, strict=False)]
+    titles = _values(axes, [1e3 * value for value in known.position.position_m], 3, width - len("position mm") - 7)
     single = len(axes) == 1  # wherever the scene puts the wall
     walls = [
         1e3 * position
@@ -241,7 +241,7 @@ def _position_box(known: ScreenState, status: Status, width: int, height: int) -
 def _force_box(known: ScreenState, status: Status, width: int, height: int) -> list[Text]:
     assert known.position is not None
     axes = _axes(status, known.position)
-    titles = [f"{name} {value:+.2f}" for name, value in zip(axes, known.position.force_n, strict=False)]
+    titles = _values(axes, known.position.force_n, 2, width - len("force N") - 7)
     # Without forces at all nothing is limited: the state in the first line says it.
     limited = status.armed and known.position.force_n != known.position.force_requested_n
     styles = [_REQUESTED] * len(axes) + [_AXIS_STYLES[index % 3] for index in range(len(axes))]
@@ -260,10 +260,20 @@ def _axes(status: Status, position: Position) -> tuple[str, ...]:
     return names + tuple(str(index) for index in range(len(names), len(position.position_m)))
 
 
+def _values(axes: Sequence[str], values: Sequence[float], digits: int, width: int) -> list[str]:
+    """A value an axis, with as many digits as there is room for."""
+    titles: list[str] = []
+    for shown in range(digits, -1, -1):
+        titles = [f"{name} {value:+.{shown}f}" for name, value in zip(axes, values, strict=False)]
+        if len(" ".join(titles)) <= width:
+            break
+    return titles
+
+
 def _coloured(titles: Sequence[str], unit: str) -> Text:
     text = Text("")
     for index, title in enumerate(titles):
-        text.append("  " if index else "").append(title, f"bold {_AXIS_STYLES[index % 3]}")
+        text.append(" " if index else "").append(title, f"bold {_AXIS_STYLES[index % 3]}")
     return text.append(unit, _QUIET)
 
 

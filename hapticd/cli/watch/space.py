@@ -20,6 +20,7 @@ _QUIET = "bright_black"
 _AXES = "xyz"
 _LEAST_M = 0.01  # smallest half width of a view
 _ARROWS = "→↗↑↖←↙↓↘"
+_LEFT_S = 0.1  # positions and touches come in batches of their own: by then a touch is over
 _TALL = 2.0  # a character is about twice as high as wide
 
 Point = Sequence[float]
@@ -32,11 +33,12 @@ class Trail:
         self.points: deque[Point] = deque(maxlen=600)
         self.touches: list[Touch] = []
         self._seq = -1
+        self._touched_s = -math.inf
         self._due_s = -math.inf
 
-    def pass_by(self, timestamp: float, position_m: Point, seq: int) -> None:
-        """Take a position; what was touched before it is no longer."""
-        if self.touches and seq > self._seq + 2:  # both come in batches of their own
+    def pass_by(self, timestamp: float, position_m: Point) -> None:
+        """Take a position; what was touched long before it is no longer."""
+        if self.touches and abs(timestamp - self._touched_s) > _LEFT_S:
             self.touches = []
         if abs(timestamp - self._due_s) >= 0.005:
             self._due_s = timestamp
@@ -46,6 +48,7 @@ class Trail:
         """Take what is touched in a tick; those of one tick come together."""
         if touch.seq != self._seq:
             self._seq = touch.seq
+            self._touched_s = touch.timestamp
             self.touches = []
         self.touches.append(touch)
 

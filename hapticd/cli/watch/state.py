@@ -78,7 +78,7 @@ class ScreenState:
         self.forces.add(position.timestamp, position.force_requested_n + position.force_n)
         self.position = position
         if len(position.position_m) == 3:
-            self.trail.pass_by(position.timestamp, position.position_m, position.seq)
+            self.trail.pass_by(position.timestamp, position.position_m)
 
     def _take_damping(self, damping: Damping) -> None:
         self.damping = damping

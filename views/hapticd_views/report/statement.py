@@ -42,15 +42,19 @@ class Statement:
 def statements(source: Source) -> list[Statement]:
     """What there is to say of a run."""
     recording = source.recording
-    told = [_stability(judge(source.curves[0])), _law(source.curves[0], recording)]
+    in_space = recording is not None and bool(recording.receipt.get("object_name"))
+    told = [_stability(judge(source.curves[0]), in_space), _law(source.curves[0], recording)]
     if recording is not None:
         told += [_faults(recording), _machine(source.curves[0], recording)]
     return told
 
 
-def _stability(found: Stability) -> Statement:
+def _stability(found: Stability, in_space: bool) -> Statement:
     mark: Mark = "unknown" if not found.judged else "good" if found.stable else "bad"
-    return Statement("Was it stable?", mark, found.words, {key: _known(value) for key, value in asdict(found).items()})
+    words = found.words
+    if in_space and not found.judged:
+        words = "Not judged: the scene has objects, and only what happens at a wall is judged."
+    return Statement("Was it stable?", mark, words, {key: _known(value) for key, value in asdict(found).items()})
 
 
 def _law(curves: Curves, recording: Recording | None) -> Statement:
@@ -75,9 +79,10 @@ def _law(curves: Curves, recording: Recording | None) -> Statement:
     if recording is not None and "generated_j" in recording.ticks:
         made_j, taken_j = (_grown(recording, name) for name in ("generated_j", "dissipated_j"))
         numbers |= {"generated_j": made_j, "dissipated_j": taken_j}
-        times = f", {taken_j / made_j:.3g} times as much" if made_j > 1e-9 else ""
+        times = f", {taken_j / made_j:.3g} times as much" if made_j > 1e-9 and taken_j > 0.0 else ""
+        did = "took" if taken_j >= 0.0 else "made another"
         text.append(
-            f"Sampling and hold made {made_j * 1e3:.3g} mJ; law and wall damping took {taken_j * 1e3:.3g} mJ{times}."
+            f"Sampling and hold made {made_j * 1e3:.3g} mJ; law and damping {did} {abs(taken_j) * 1e3:.3g} mJ{times}."
         )
     elif "energy_j" in curves:
         numbers["energy_j"] = float(curves["energy_j"][-1])
