@@ -208,3 +208,25 @@ def test_files_hold_no_number_that_others_cannot_read(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "a.json").read_bytes()) == {"a": [1.5, None, None], "b": ["x", None, True]}
     assert as_csv(("a", "b"), [[0.1, float("nan")], ["p,q", 2]]) == b'a,b\n0.1,\n"p,q",2\n'
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
+
+
+def alone(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
+    """A row that says which process made it; one block kills that, as long as it is told to."""
+    assert threads == 1
+    if block == 3 and Path(spec["deadly"]).exists():
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [[float(block), float(os.getpid())]]
+
+
+def test_interpreted_work_runs_in_processes_and_goes_on_after_one_has_died(tmp_path: Path) -> None:
+    deadly = tmp_path / "deadly"
+    deadly.touch()
+    job = Job(alone, {"deadly": str(deadly)}, (1,) * 6, (), interpreted=True)
+    died = pytest.raises(HapticdError, match=r"a process of the study died.*the same command goes on")
+    with died, kept(job, tmp_path / "journal") as journal:
+        run(job, journal, "alone")
+    deadly.unlink()
+    with kept(job, tmp_path / "journal") as journal:
+        rows = run(job, journal, "alone")
+    assert [block[0][0] for block in rows] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert os.getpid() not in {block[0][1] for block in rows}

@@ -32,12 +32,14 @@ class Job:
         spec: the settings, of JSON's types.
         sizes: how many cells each block has.
         laws: the laws whose source decides about the results.
+        interpreted: the work is plain Python, so that a block keeps one processor busy and takes a process of its own.
     """
 
     work: Work
     spec: dict[str, Any]
     sizes: tuple[int, ...]
     laws: tuple[str, ...]
+    interpreted: bool = False
 
 
 def block_sizes(cells: int, most: int) -> tuple[int, ...]:

@@ -69,13 +69,17 @@ def run(job: Job, journal: Journal, label: str, cluster: str | None = None) -> l
 
 
 def _blocks(job: Job, left: Sequence[int], cluster: str | None) -> Iterator[tuple[int, list[Row]]]:
-    if cluster is None:
-        for block in left:
-            yield block, job.work(job.spec, block, None)
-    elif left:
+    if cluster is not None and left:
         from hapticd_studies.grid.cluster import blocks  # an extra of its own
 
         yield from blocks(cluster, job, left)
+    elif job.interpreted and len(left) > 1:
+        from hapticd_studies.grid.processes import blocks_in_processes
+
+        yield from blocks_in_processes(job, left)
+    else:
+        for block in left:
+            yield block, job.work(job.spec, block, None)
 
 
 @contextmanager
