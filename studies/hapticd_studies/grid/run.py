@@ -73,7 +73,7 @@ def _blocks(job: Job, left: Sequence[int], cluster: str | None) -> Iterator[tupl
         from hapticd_studies.grid.cluster import blocks  # an extra of its own
 
         yield from blocks(cluster, job, left)
-    elif job.interpreted and len(left) > 1:
+    elif job.interpreted and left:
         from hapticd_studies.grid.processes import blocks_in_processes
 
         yield from blocks_in_processes(job, left)
