@@ -10,10 +10,11 @@ import ipaddress
 import re
 from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from hapticd.config.objects import MAX_OBJECTS, ObjectConfig, check_names
 from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig
+from hapticd.config.remote import MAX_PORTS, CouplingConfig, ForceConfig, check_ports
 from hapticd.config.safety import SafetyConfig
 from hapticd.config.walls import MAX_WALLS, WallConfig
 from hapticd.settings import Table
@@ -50,18 +51,27 @@ class LoopConfig(Table):
 
 
 class SceneConfig(Table):
-    """[scene]: walls across an axis, and objects in space."""
+    """[scene]: walls across an axis, objects in space, and what clients drive."""
 
     walls: tuple[WallConfig, ...] = Field((), max_length=MAX_WALLS, description="the walls, at most eight")
     objects: tuple[ObjectConfig, ...] = Field(
         (), max_length=MAX_OBJECTS, description="the objects, at most 64; they need a device with three axes"
     )
+    couplings: tuple[CouplingConfig, ...] = Field(
+        (), max_length=MAX_PORTS, description="springs to targets that clients move"
+    )
+    forces: tuple[ForceConfig, ...] = Field((), max_length=MAX_PORTS, description="forces that clients send")
 
     @field_validator("objects")
     @classmethod
     def _names_differ(cls, objects: tuple[ObjectConfig, ...]) -> tuple[ObjectConfig, ...]:
         check_names(objects)
         return objects
+
+    @model_validator(mode="after")
+    def _ports_differ(self) -> SceneConfig:
+        check_ports((each.name for each in self.objects), self.couplings, self.forces)
+        return self
 
 
 class VelocityConfig(Table):

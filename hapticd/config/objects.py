@@ -11,6 +11,12 @@ from hapticd.settings import Table
 MAX_OBJECTS = 64
 """Most objects in a scene."""
 
+HOLD_S = 0.1
+"""How long what a client said of a target or an object is good, unless told otherwise [s]."""
+
+MAX_SPEED_M_PER_S = 1.0
+"""How fast a target or an object follows its client, unless told otherwise [m/s]."""
+
 _Metre = Annotated[float, Field(ge=-10.0, le=10.0)]
 _Size = Annotated[float, Field(gt=0.0, le=10.0)]
 _LEAST_LENGTH = 1e-6
@@ -35,6 +41,20 @@ class ObjectTable(Table):
     dynamic_friction: float = Field(
         0.0, ge=0.0, le=10.0, description="coefficient while it slips, at most static_friction"
     )
+    remote: bool = Field(False, description="true: a client moves it, by its name")
+    hold_s: float | None = Field(
+        None,
+        gt=0.0,
+        le=10.0,
+        description="with remote = true: how long its motion goes on after the client's last message [s]; "
+        f"unset: {HOLD_S}",
+    )
+    max_speed_m_per_s: float | None = Field(
+        None,
+        gt=0.0,
+        le=10.0,
+        description=f"with remote = true: how fast its origin follows the client [m/s]; unset: {MAX_SPEED_M_PER_S}",
+    )
 
     @field_validator("orientation")
     @classmethod
@@ -50,6 +70,13 @@ class ObjectTable(Table):
                 f"dynamic_friction = {self.dynamic_friction:g}: must be at most static_friction, "
                 f"{self.static_friction:g}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _only_a_remote_one_follows(self) -> ObjectTable:
+        for key in ("hold_s", "max_speed_m_per_s"):
+            if not self.remote and getattr(self, key) is not None:
+                raise ValueError(f"{key} = {getattr(self, key):g}: only an object with remote = true has it")
         return self
 
 

@@ -1,0 +1,76 @@
+"""[[scene.couplings]] and [[scene.forces]]: what other programs drive, and the limits that they do it under."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pydantic import Field
+
+from hapticd.settings import Table
+
+MAX_PORTS = 16
+"""Most couplings and forces together: the size of a tick record is fixed when the ring is made."""
+
+
+class CouplingConfig(Table):
+    """[[scene.couplings]]: a spring and a damper between the device and a target that a client moves."""
+
+    name: str = Field(min_length=1, max_length=40, description="its name, unique in the scene: clients go by it")
+    stiffness_n_per_m: float = Field(
+        ge=0.0, le=1e6, description="spring stiffness [N/m]; a client may ask for less, never for more"
+    )
+    damping_n_s_per_m: float = Field(
+        0.0, ge=0.0, le=1e4, description="damping between device and target [N s/m]; a client may ask for less"
+    )
+    max_force_n: float = Field(
+        gt=0.0, le=1e4, description="largest force of it on the device, the law's damping included [N]"
+    )
+    hold_s: float = Field(
+        0.1, gt=0.0, le=10.0, description="how long a target is good; an older one is let go by a ramp [s]"
+    )
+    max_speed_m_per_s: float = Field(1.0, gt=0.0, le=10.0, description="how fast a target that jumps is followed [m/s]")
+
+
+class ForceConfig(Table):
+    """[[scene.forces]]: a force that a client sends."""
+
+    name: str = Field(min_length=1, max_length=40, description="its name, unique in the scene: clients go by it")
+    max_force_n: float = Field(
+        gt=0.0, le=1e4, description="largest force of it on the device, the law's damping included [N]"
+    )
+    hold_s: float = Field(
+        0.05, gt=0.0, le=10.0, description="how long a force is good; an older one is let go by a ramp [s]"
+    )
+    unchanged_s: float = Field(
+        1.0,
+        ge=0.0,
+        le=3600.0,
+        description="how long a force may stay the same, however often it is sent: a client that hangs sends its "
+        "last one for ever [s]; 0: as long as it is sent",
+    )
+
+
+def check_ports(objects: Iterable[str], couplings: Sequence[CouplingConfig], forces: Sequence[ForceConfig]) -> None:
+    """Refuse names that stand twice, and too many couplings and forces.
+
+    Args:
+        objects: the names of the scene's objects.
+        couplings: its couplings.
+        forces: its forces.
+
+    Raises:
+        ValueError: there are such.
+    """
+    if len(couplings) + len(forces) > MAX_PORTS:
+        raise ValueError(
+            f"couplings and forces: must be {MAX_PORTS} together at most, not {len(couplings) + len(forces)}"
+        )
+    seen: dict[str, str] = dict.fromkeys(objects, "an object")
+    for kind, names in (
+        ("a coupling", [each.name for each in couplings]),
+        ("a force", [each.name for each in forces]),
+    ):
+        for name in names:
+            if name in seen:
+                raise ValueError(f'{seen[name]} and {kind} have the name "{name}": names are unique in a scene')
+            seen[name] = kind
