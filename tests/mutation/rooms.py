@@ -52,6 +52,17 @@ ROOMS = {
         tuple(f"hapticd/tick/{name}.py" for name in ("tick", "contact", "motion", "arrangement")),
         ("tests/tick",),
     ),
+    "space": Room(
+        tuple(f"hapticd/tick/space/{name}.py" for name in ("books", "channel", "solid", "solid_contact", "tick")),
+        ("tests/tick/space", "tests/shapes/test_solid.py", "tests/shapes/test_friction.py"),
+    ),
+    "shapes": Room(
+        tuple(
+            f"hapticd/shapes/{name}.py"
+            for name in ("distance", "field", "pose", "proxy", "reach", "scalars", "solid", "surface")
+        ),
+        ("tests/shapes", "tests/tick/space"),
+    ),
     "velocity": Room(("hapticd/tick/velocity.py",), _tick("velocity", "tick_motion")),
     "scene": Room(("hapticd/tick/scene.py",), _tick("scene", "wall_changes", "switching", "tick_transitions")),
     "loop": Room(

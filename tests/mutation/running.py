@@ -22,6 +22,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
 from typing import cast
@@ -29,6 +30,7 @@ from typing import cast
 import pytest
 
 from tests.mutation.harmless import HARMLESS
+from tests.mutation.order import Experience, InOrder, Told
 from tests.mutation.rooms import ROOMS, Room
 from tests.mutation.slips import Slip, slips
 
@@ -95,28 +97,32 @@ def judge(
     Raises:
         RuntimeError: the tests fail on the tree as it is.
     """
+    known = Experience()
     with tempfile.TemporaryDirectory(prefix="mutation-") as place:
-        free: SimpleQueue[Path] = SimpleQueue()
-        for number in range(parallel):
-            free.put(_copy(Path(place) / str(number)))
-        tree = free.get()
+        tree = _copy(Path(place) / "0")
+        known.took_s = _without_slip(tree, room, known, os.environ.get("PYTHONDONTWRITEBYTECODE", ""))
         started_s = time.monotonic()
-        if not _passes(tree, room, 3600.0):
-            raise RuntimeError(f"the tests fail without any slip: {' '.join(room.tests)}")
+        _without_slip(tree, room, known, "1")  # a test that fails in another order would find every slip
         limit_s = max(LEAST_S, 5.0 * (time.monotonic() - started_s))
+        free: SimpleQueue[Path] = SimpleQueue()
         free.put(tree)
+        for number in range(1, parallel):
+            free.put(shutil.copytree(tree, Path(place) / str(number)))
 
         def survives(slip: Slip) -> bool:
             mine = free.get()
             file = mine / slip.file
-            source = file.read_text()
+            source, stamp = file.read_text(), file.stat()
             try:
                 file.write_text(slip.into(source))
-                lives = _passes(mine, room, limit_s)
+                told = _run(mine, room, known, "1", limit_s)
+                lives = told is not None and not told.failed
+                known.noticed.update(told.failed[:1] if told else ())
                 progress(slip, lives)
                 return lives
             finally:
                 file.write_text(source)
+                os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))  # its bytecode is good once more
                 free.put(mine)
 
         with ThreadPoolExecutor(parallel) as pool:
@@ -141,36 +147,50 @@ def _copy(to: Path) -> Path:
     return to
 
 
-def _passes(tree: Path, room: Room, limit_s: float) -> bool:
-    """Whether the room's tests pass on a tree in the time given; a run that is cut short is ended with its children."""
+def _without_slip(tree: Path, room: Room, known: Experience, no_bytecode: str) -> dict[str, float]:
+    """How long each test takes on the tree as it is [s]."""
+    told = _run(tree, room, known, no_bytecode, 3600.0)
+    if told is None or told.failed or not told.took_s:
+        failed = " ".join(told.failed if told else room.tests)
+        raise RuntimeError(f"fails without any slip: {failed}")
+    return told.took_s
+
+
+def _run(tree: Path, room: Room, known: Experience, no_bytecode: str, limit_s: float) -> Told | None:
+    """Run a room's tests on a tree until one fails; None where that ended early or took longer than the limit."""
     arguments = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-W", _PRELOADED, *room.tests]
     if room.select:
         arguments += ["-k", room.select]
-    running = _FORKS.Process(target=_run_tests, args=(tree, arguments))
+    hearing, telling = _FORKS.Pipe(duplex=False)
+    running = _FORKS.Process(target=_run_tests, args=(tree, arguments, known, no_bytecode, telling))
     running.start()
-    running.join(limit_s)
-    if running.exitcode is None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(cast("int", running.pid), signal.SIGKILL)
-        running.kill()
-        running.join()
-    return running.exitcode == 0
+    telling.close()
+    with hearing, contextlib.suppress(EOFError):
+        told: Told | None = hearing.recv() if hearing.poll(limit_s) else None
+        running.join(limit_s if told else 0.0)
+        if running.exitcode in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+            return told
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(cast("int", running.pid), signal.SIGKILL)
+    running.kill()
+    running.join()
+    return None
 
 
-def _run_tests(tree: Path, arguments: Sequence[str]) -> None:
+def _run_tests(tree: Path, arguments: Sequence[str], known: Experience, no_bytecode: str, telling: Connection) -> None:
     """What a process does that was forked for it: nothing of the tree has been imported yet."""
     os.setsid()
     os.chdir(tree)
     paths = [str(tree / source) for source in ("", *SOURCES[1:])]
     sys.path[:0] = paths
-    os.environ |= {"PYTHONPATH": os.pathsep.join(paths), "PYTHONDONTWRITEBYTECODE": "1", "CI": "false"}
-    sys.dont_write_bytecode = True
+    os.environ |= {"PYTHONPATH": os.pathsep.join(paths), "PYTHONDONTWRITEBYTECODE": no_bytecode, "CI": "false"}
+    sys.dont_write_bytecode = bool(no_bytecode)
     with Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
     loaded = [name for name in sys.modules if name.startswith("hapticd")]
     assert not loaded, loaded
-    os._exit(pytest.main(list(arguments)))
+    os._exit(pytest.main(list(arguments), [InOrder(known, telling)]))
 
 
 def _tell(slip: Slip, lives: bool) -> None:
@@ -187,9 +207,10 @@ def main() -> None:
     parser.add_argument("rooms", nargs="*", default=list(ROOMS))
     parser.add_argument("--slips", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--parallel", type=int, default=PARALLEL)
     arguments = parser.parse_args()
     for name in arguments.rooms:
-        verdict = judge(ROOMS[name], sample(ROOMS[name], arguments.slips, arguments.seed), progress=_tell)
+        verdict = judge(ROOMS[name], sample(ROOMS[name], arguments.slips, arguments.seed), arguments.parallel, _tell)
         sys.stdout.write(f"{name}: {verdict}\n{told(verdict.survivors)}\n\n")
         sys.stdout.flush()
 
