@@ -1,11 +1,14 @@
-"""A control loop of its own for `strace`: as the daemon sets it up, for a number of ticks, between two marks."""
+"""A control loop of its own under `strace`: as the daemon sets it up, for a number of ticks, between two marks."""
 
 from __future__ import annotations
 
+import re
+import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
-from hapticd.config.loading import parse
+from hapticd.config.loading import load
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.realtime import become_realtime, sleep_until
@@ -13,24 +16,59 @@ from hapticd.loop.warm_up import warm_up
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.record import RecordLayout
 
+ROOT = Path(__file__).parents[2]
 BEGIN, END = Path("/begin-of-the-ticks"), Path("/end-of-the-ticks")
 """Files that are looked for, and are not there, so that it is seen where the ticks begin and end."""
 
 # Slow, and with all of the period for a tick: one that is traced is not taken for one that computes too long.
-CONFIG = """
+UNHURRIED = """
 [loop]
 rate_hz = 500.0
 law_budget = 1.0
-[device.options]
-hand.force = { profile = "press-and-release", newton = -5.0, release_newton = 0.3, period_s = 0.5 }
-[[scene.walls]]
-stiffness_n_per_m = 5000.0
 """
 
+_CALL = re.compile(r"^\d+ +(\w+)\((.*)")
 
-def main(ticks: int) -> None:
-    """Run a loop for some ticks."""
-    config = parse(CONFIG, "traced")
+
+def system_calls(config: str, ticks: int, directory: Path, environment: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Name and arguments of each system call of the loop's thread, from the first tick to the last.
+
+    Args:
+        config: of the daemon.
+        ticks: how many.
+        directory: for the configuration and the trace.
+        environment: what the loop has besides.
+
+    Raises:
+        AssertionError: the loop has failed.
+    """
+    file, trace = directory / "traced.toml", directory / "trace"
+    file.write_text(config)
+    settings = [word for name, value in environment.items() for word in ("-E", f"{name}={value}")]  # not strace's own
+    loop = [sys.executable, "-m", "tests.loop.system_calls", str(file), str(ticks)]
+    command = ["strace", "-f", "-y", "-o", str(trace), *settings, *loop]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=200)
+    assert done.returncode == 0, done.stderr
+    return _between_the_marks(trace)
+
+
+def _between_the_marks(trace: Path) -> list[tuple[str, str]]:
+    found: list[tuple[str, str]] = []
+    loop = ""
+    begun = False
+    for line in trace.read_text().splitlines():
+        if str(BEGIN) in line:
+            loop, begun = line.split()[0], True
+        elif str(END) in line:
+            return found
+        elif begun and line.split()[0] == loop and (call := _CALL.match(line)):
+            found.append((call[1], call[2]))
+    raise AssertionError("the loop did not come to its end")
+
+
+def main(file: str, ticks: int) -> None:
+    """Run the loop of a configuration for some ticks."""
+    config = load(file)
     settings = config.config
     driver = config.driver(config.options, settings.loop.period_s)
     place_device(config, driver)
@@ -56,4 +94,4 @@ def main(ticks: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(sys.argv[1], int(sys.argv[2]))

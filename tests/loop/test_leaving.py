@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -13,7 +14,7 @@ from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DriverError
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import DISARM, SUPERVISOR_BEAT, EventReader, SharedMemory
-from hapticd.loop.resume import FROM_START, ResumeState, left_by
+from hapticd.loop.resume import FROM_START, ResumeState, identity, left_by
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
@@ -179,3 +180,18 @@ def test_an_arm_that_was_sent_before_disarming_was_asked_for_does_not_arm(shared
     assert not left.may_arm
     assert "disarming was asked for after it" in shared.verdict()
     assert EventCode.ARMED not in [event.code for event in EventReader(shared).read()]
+
+
+def test_a_device_is_known_again_by_all_that_subscribers_were_told_of_it() -> None:
+    one = device(serial="7")
+    assert identity(one) == "a device 7 (z)"
+    assert identity(replace(one, serial="", buttons=2)) == "a device (z, 2 buttons)"
+    others = [
+        replace(one, model="another"),
+        replace(one, serial="8"),
+        device("x", serial="7"),
+        replace(one, buttons=1),
+        replace(one, has_gripper=True),
+        replace(one, has_orientation=True),
+    ]
+    assert len({identity(info) for info in (one, *others)}) == 7

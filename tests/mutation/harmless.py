@@ -6,6 +6,7 @@ EQUAL: dict[str, tuple[str, ...]] = {
     "at the very bound both give the same number": (
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 0 is Lt]",
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 1 is Lt]",
+        "hapticd/tick/guard.py: blended: if weight >= 1.0:  [GtE 0 is Gt]",
         "hapticd/tick/guard.py: blended: weight: float = done / state.blend_ticks if done > 0.0 else 0.0  "
         "[Gt 0 is GtE]",
         "controllers/hapticd_controllers/tdpa.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
@@ -20,7 +21,30 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "drivers/hapticd_drivers/rig/frames.py: _decoded: if len(frame) > LONGEST_FRAME:  [without return None]",
         "drivers/hapticd_drivers/rig/conversation.py: Conversation.await_state: if left_ns <= 0:  [0 is 1]",
     ),
+    "how far the old one is from the new one is the same either way round": (
+        "hapticd/tick/guard.py: Guard._aim: self._axis_rate = _rate(self.max_axis_n, goal_axis_n, ramp_s)  "
+        "[self.max_axis_n one later]",
+    ),
+    "what counts rises is reset by the first fall, and none counts before it": (
+        "hapticd/tick/energy.py: EnergyLedger.__init__: self.window_rises = 0  [0 is 1]",
+    ),
+    "the bound lies half a sample off what any clock comes to": (
+        "hapticd/tick/motion.py: Motion.frozen: return self.repeated >= LEAST_REPEATS and self.repeated_s >= "
+        "self._frozen_s  [GtE 0 is Gt]",
+    ),
+    "no clock and no sum of measured places comes to it exactly": (
+        "hapticd/supervisor/recovery.py: HotplugWatch.news: if now_s < self._due_s:  [Lt 0 is LtE]",
+        "hapticd/supervisor/recovery.py: Recovery.begin: if now_s - self._found_s > STEADY_S:  [Gt 0 is GtE]",
+        "drivers/hapticd_drivers/rig/motion.py: find_stop: if abs(end.position_m - first.position_m) > max(AGREE_M, "
+        "AGREE_COUNTS * drive.count_m):  [Gt 0 is GtE]",
+    ),
+    "all times of a history may move together": (
+        "hapticd/tick/velocity.py: push: if last_s > 10.0:  [Gt 0 is GtE]",
+        "hapticd/tick/velocity.py: _History.start: self.time_s[0] = 0.0  [0.0 is 1.0]",
+    ),
     "it is set before it is read": (
+        "hapticd/tick/contact.py: Contact.__init__: def __init__  [without self.x_m = 0.0]",
+        "hapticd/tick/tick.py: ControlTick.__init__: def __init__  [without self._excused = False]",
         "hapticd/tick/energy.py: EnergyLedger.__init__: self.window_minimum_j = 0.0  [0.0 is 1.0]",
         "hapticd/tick/energy.py: EnergyLedger.__init__: def __init__  [without self.window_minimum_j = 0.0]",
         "hapticd/supervisor/recovery.py: Recovery.__init__: def __init__  [without self.lost_s = 0.0]",

@@ -64,7 +64,10 @@ ROOMS = {
         ("tests/shapes", "tests/tick/space"),
     ),
     "velocity": Room(("hapticd/tick/velocity.py",), _tick("velocity", "tick_motion")),
-    "scene": Room(("hapticd/tick/scene.py",), _tick("scene", "wall_changes", "switching", "tick_transitions")),
+    "scene": Room(
+        ("hapticd/tick/scene.py",),
+        (*_tick("scene", "wall_changes", "switching", "tick_transitions"), "tests/tick/space/test_changes.py"),
+    ),
     "loop": Room(
         tuple(f"hapticd/loop/{name}.py" for name in ("loop", "session", "requests", "memory", "resume")),
         tuple(

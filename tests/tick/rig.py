@@ -128,7 +128,7 @@ class Rig:
             self.sample.sequence += 1
             here_m = self.tick.motion.position_m  # always the same list
             before_m, before_n = list(here_m), list(self.tick.force_n)
-            written.append(list(self.tick.step(self.sample, dt_s)))
+            written.append(list(self.tick.advance(self.sample, dt_s)))
             self.energy_j -= sum(
                 newton * (now - was) for newton, now, was in zip(before_n, here_m, before_m, strict=True)
             )

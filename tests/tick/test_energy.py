@@ -88,6 +88,13 @@ def test_a_cycle_is_found_once() -> None:
     assert run([3.0, 2.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]) == [4]
 
 
+def test_a_cycle_that_has_been_found_is_not_found_again_where_contact_ends() -> None:
+    state = fresh()
+    found = [cycle_ended(state, energy_j, True, 2, 2) for energy_j in (3.0, 2.0, 1.0, 2.0, 3.0)]
+    assert found == [False, False, False, False, True]
+    assert not cycle_ended(state, 3.0, False, 2, 2)
+
+
 def test_contact_loss_ends_a_cycle() -> None:
     """Outside the wall the energy is flat, so a strictly rising window would never see the minimum (eq. 10)."""
     state = fresh()

@@ -10,7 +10,7 @@ import pytest
 from hapticd.errors import PluginError
 from hapticd.law import check_law
 from hapticd.tick.event import EventCode
-from hapticd_controllers import energy_cycle, tdpa
+from hapticd_controllers import energy_cycle, none, tdpa
 from tests.tick.rig import law, running, wall
 from tests.tick.transitions import pressed
 
@@ -36,6 +36,16 @@ def test_what_a_law_declares_as_learned_is_found_by_the_next_one_and_nothing_els
         rig.switch(make_law=running(second))
         assert found[0] == 0.0
         assert found_next == [expected]
+
+
+def test_what_one_law_published_is_not_said_of_the_next() -> None:
+    """A law without damping publishes none, so nothing would ever overwrite what the one before has left."""
+    first, _ = learner()
+    rig = pressed(module=first)
+    assert rig.tick.contacts[0].damping_n_s_per_m == 30.0
+    rig.switch(make_law=running(none))
+    rig.force(-2e-3)
+    assert rig.tick.contacts[0].damping_n_s_per_m == 0.0
 
 
 def test_after_the_fallback_a_law_starts_without_the_fallbacks_damping() -> None:

@@ -99,3 +99,27 @@ def test_an_adaptive_window_that_there_is_no_time_for_is_refused() -> None:
     Motion(VelocityConfig(estimator="foaw", samples=10), device("xyz"), 1.0 / 8000.0)
     with pytest.raises(ConfigError, match=r"velocity\.samples = 64: foaw .* has time for 10$"):
         Motion(longest, device("xyz"), 1.0 / 8000.0)
+
+
+def test_a_speed_that_is_watched_from_now_on_knows_nothing_of_the_way_until_then() -> None:
+    """Also under a filter, which goes on: 50 mm on the way would be 50 m/s, and a fault."""
+    motion = Motion(VelocityConfig(estimator="lowpass", cutoff_hz=50.0), device("z"), PERIOD_S)
+    sample = Sample(1)
+    assert motion.start(sample)
+    sample.position_m[0] = 0.05
+    assert motion.see(sample, PERIOD_S, PERIOD_S, at_rest=False)
+    motion.watch_speed(True)
+    assert motion.see(sample, PERIOD_S, PERIOD_S, at_rest=False)
+    assert motion.speed_squared == 0.0
+
+
+def test_from_a_new_origin_on_positions_count_from_there() -> None:
+    motion = Motion(VelocityConfig(), device("z"), PERIOD_S)
+    sample = Sample(1)
+    sample.position_m[0] = 0.03
+    assert motion.start(sample)
+    motion.move_origin([0.02])
+    assert motion.position_m == [pytest.approx(0.01)]
+    assert motion.see(sample, PERIOD_S, PERIOD_S, at_rest=False)
+    assert motion.position_m == [pytest.approx(0.01)]
+    assert motion.velocity_m_per_s == [pytest.approx(0.0)]

@@ -85,12 +85,13 @@ def test_the_long_difference_is_late_by_half_its_window() -> None:
 
 
 def test_the_long_difference_stays_exact_over_hours() -> None:
-    """Its clock is wound back every few seconds, so that no time grows large."""
+    """Its clock is wound back every few seconds: 1 ms in eleven days of seconds is known to a part in ten million."""
     made = LongDifference(2)
     made.start(0.0)
-    for count in range(1, 4001):
-        velocity = made.update(0.5 * count, 10.0, 0.0)
-        assert velocity == pytest.approx(0.05, rel=1e-12)
+    made.update(0.0, 1e6, 0.0)
+    for count in range(1, 101):
+        velocity = made.update(5e-5 * count, 1e-3, 0.0)
+        assert count < 2 or velocity == pytest.approx(0.05, rel=1e-12)
 
 
 @given(steps_s=STEPS_S)

@@ -268,3 +268,73 @@ def test_a_handle_that_creeps_for_ever_is_given_up_in_time() -> None:
         motion.find_switch(drive_of(handle), 1.0)
     assert handle.time_s == pytest.approx(2.0 * (1.5 * 0.08 + motion.LAG_M) / 0.02 + 5.0, abs=0.02)
     assert handle.forces_n[-1] == 0.0
+
+
+class Sprung(Handle):
+    """A handle that once it has been pressed against its lower end is another.
+
+    Args:
+        free_m: how far it comes off that end from then on.
+        back_m: how far it springs back when it is let go of there.
+        shift_m: how much further down the end is from then on.
+    """
+
+    def __init__(self, free_m: float = 0.08, back_m: float = 0.0, shift_m: float = 0.0) -> None:
+        super().__init__()
+        self.free_m, self.back_m, self.shift_m = free_m, back_m, shift_m
+        self.pressed = False
+        self.turned_at_m = math.nan
+
+    def push(self, axis: int, force_n: float) -> Moment:
+        if force_n < 0.0 and math.isnan(self.turned_at_m):
+            self.turned_at_m = self.position_m
+        if force_n < 0.0 and self.position_m == self.stops_m[0]:
+            self.pressed = True
+        elif force_n == 0.0 and self.pressed:
+            self.pressed = False
+            low_m = -0.03 - self.shift_m
+            self.stops_m = (low_m, low_m + self.free_m)
+            self.position_m += self.back_m
+        return super().push(axis, force_n)
+
+
+def test_a_handle_that_does_not_come_off_its_end_is_stuck() -> None:
+    """From half of the way on that it should come off, it is free enough."""
+    with pytest.raises(DeviceFaultError, match=r"is stuck: .* = 0\.5 N does not move it"):
+        motion.find_stop(drive_of(Sprung(free_m=2e-3)), -1.0)
+    assert motion.find_stop(drive_of(Sprung(free_m=3e-3)), -1.0) == -3000
+
+
+def test_a_handle_that_springs_back_from_its_end_has_another_end_than_where_it_rests() -> None:
+    with pytest.raises(DeviceFaultError, match=r"moves \+3.0 mm by itself: let go of it"):
+        motion.find_stop(drive_of(Sprung(back_m=3e-3)), -1.0)
+    assert motion.find_stop(drive_of(Sprung(back_m=2e-3)), -1.0) == -2800
+
+
+def test_an_end_is_at_one_place_within_three_tenths_of_a_millimetre_or_four_counts() -> None:
+    motion.find_stop(drive_of(Sprung(shift_m=0.25e-3)), -1.0)
+    shifted = drive_of(Sprung(shift_m=0.35e-3))
+    with pytest.raises(DeviceFaultError, match=r"two places 0\.35 mm apart"):
+        motion.find_stop(shifted, -1.0)
+    motion.find_stop(replace(drive_of(Sprung(shift_m=0.35e-3)), count_m=1e-4), -1.0)
+    with pytest.raises(DeviceFaultError, match="two places"):
+        motion.find_stop(replace(drive_of(Sprung(shift_m=0.45e-3)), count_m=1e-4), -1.0)
+
+
+def test_a_handle_at_its_end_is_taken_off_it_first_and_each_drive_begins_without_force() -> None:
+    handle = Sprung()
+    handle.position_m = -0.03
+    motion.find_stop(drive_of(handle), -1.0)
+    assert handle.turned_at_m > -0.03 + 0.8 * motion.BACK_OFF_M
+    assert handle.forces_n[0] == 0.0
+    assert max(map(abs, handle.forces_n[:10])) < 0.2 * BOUND_N
+
+
+def test_a_nudge_rises_alike_both_ways() -> None:
+    handle = Drifting(0.0, 0.0)
+    with pytest.raises(DeviceFaultError, match="does not move"):
+        motion.check_sign(drive_of(handle))
+    forward = [force_n for force_n in handle.forces_n if force_n > 0.0]
+    backward = [-force_n for force_n in handle.forces_n if force_n < 0.0]
+    assert forward[:400] == pytest.approx(backward[:400])
+    assert forward.index(BOUND_N) == pytest.approx(1e3 * motion.NUDGE_RAMP_S, abs=2.0)
