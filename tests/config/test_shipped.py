@@ -16,7 +16,8 @@ from hapticd.paths import directory
 from hapticd.tick.assemble import make_tick, place_device
 
 SHIPPED = sorted(directory("config").glob("*.toml"))
-REAL_DEVICES = {"hid-rig", "inverse3", "moteus", "odrive", "omega7", "serial-rig"}
+REAL_DEVICES = {name: name for name in ("hid-rig", "inverse3", "moteus", "odrive", "omega7", "serial-rig")}
+REAL_DEVICES |= {"hapkit": "serial-rig"}
 RESTS = ["fig6-set1", "fig6-set2-wall", "fig6-set2-device", "native-8-none", "every-term"] + [
     f"wall-{k}-{law}" for k in (12, 18, 20) for law in ("energy-cycle", "tdpa")
 ]
@@ -47,7 +48,7 @@ def depths_m(name: str, seconds: float) -> tuple[list[float], float]:
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
 def test_every_shipped_configuration_loads(file: Path) -> None:
-    assert load(file).config.device.driver == (file.stem if file.stem in REAL_DEVICES else "loopback")
+    assert load(file).config.device.driver == REAL_DEVICES.get(file.stem, "loopback")
 
 
 @pytest.mark.parametrize("name", RESTS)

@@ -22,12 +22,15 @@ from tests.firmware.tools import FIRMWARE, HERE, need, run
 ANSWER_S = 60.0  # a loaded machine is slow, a dead board is dead for ever
 
 Pace = Literal["real", "frames", "steps"]
+Kind = Literal["uno", "hapkit"]
+KINDS: tuple[Kind, ...] = ("uno", "hapkit")
 
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What a board is made of: the program that simulates, and the firmware."""
+    """What a board is made of: what is fastened to its pins, the program that simulates, and the firmware."""
 
+    kind: Kind
     program: Path
     firmware: Path
     size: str
@@ -41,7 +44,7 @@ class BoardState:
         time_us: simulated time since the board began, through resets and unplugging [us].
         position_m, velocity_m_per_s: of the handle.
         motor_n: force that the motor exerts on the handle, from the pins of the processor [N].
-        counts: what the encoder has shown; the firmware counts from where it was switched on.
+        counts: what the sensor has shown; the firmware counts from where it was switched on.
         resets: how often the processor was reset by itself since it was plugged in.
     """
 
@@ -53,20 +56,22 @@ class BoardState:
     resets: int
 
 
-def build(directory: Path) -> Built:
+def build(directory: Path, kind: Kind = "uno", firmware: Path = FIRMWARE) -> Built:
     """Compile the firmware with its own Makefile and the simulator with the host's compiler.
 
     Args:
         directory: where the results go.
+        kind: which board.
+        firmware: the sources.
     """
     need("avr-gcc", "make", "gcc")
     if not Path("/usr/include/simavr/sim_avr.h").exists():
         pytest.skip("needs libsimavr-dev")
-    made = run("make", "-C", FIRMWARE / "serial-rig", f"BUILD={directory}")
+    made = run("make", "-C", firmware / "serial-rig", f"BOARD={kind}", f"BUILD={directory}")
     program = directory / "board"
     sources = sorted((HERE / "simulator").glob("*.c"))
     run("gcc", "-O2", "-Wall", "-Wextra", "-Werror", *sources, "-o", program, "-lsimavr", "-lutil", "-lm")
-    return Built(program, directory / "serial-rig.elf", made[made.index("AVR Memory Usage") :])
+    return Built(kind, program, directory / f"{kind}.elf", made[made.index("AVR Memory Usage") :])
 
 
 class Board:
@@ -81,9 +86,13 @@ class Board:
     """
 
     def __init__(self, built: Built, port: Path, pace: Pace = "real") -> None:
+        self.kind = built.kind
         self.port = port
         self._process = subprocess.Popen(
-            [built.program, built.firmware, pace, port], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [built.program, built.kind, built.firmware, pace, port],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
         try:
             assert self._answer() == "ready"
@@ -133,20 +142,28 @@ class Board:
         self._do(f"plant {mass_kg} {damping_n_s_per_m}")
 
     def place(self, position_m: float) -> None:
-        """Put the handle somewhere without the encoder turning, as if the rig had been switched on there."""
+        """Put the handle somewhere without its sensor turning, as if the rig had been switched on there."""
         self._do(f"place {position_m}")
 
     def reverse_motor(self, reversed_: bool) -> None:
         """Exchange the motor's wires."""
         self._do(f"reversed {int(reversed_)}")
 
-    def break_encoder(self, broken: bool) -> None:
-        """Cut the wire of the encoder's channel B."""
+    def break_sensor(self, broken: bool) -> None:
+        """Cut the wire of the encoder's channel B, or of the angle sensor's output."""
         self._do(f"broken-wire {int(broken)}")
 
     def misalign_encoder(self, phase_error_deg: float) -> None:
         """Let channel B come later than a quarter of a period after channel A [deg, below 90 either way]."""
         self._do(f"phase-error {phase_error_deg}")
+
+    def turn_magnet(self, counts: int) -> None:
+        """Turn the angle sensor's magnet on its shaft, as one does that comes loose."""
+        self._do(f"magnet {counts}")
+
+    def bend_sensor(self, share: float) -> None:
+        """Let the angle sensor's voltage rise unevenly: its slope varies by this share over half a turn."""
+        self._do(f"bend {share}")
 
     def press(self, button: bool) -> None:
         """Press or release the button."""

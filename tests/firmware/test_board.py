@@ -1,4 +1,4 @@
-"""The real firmware, machine code of an ATmega328P, in simulated time: what it does does not depend on this machine."""
+"""The real firmware, machine code of an ATmega328P, in simulated time: what every board does."""
 
 from __future__ import annotations
 
@@ -15,50 +15,34 @@ from hypothesis import strategies as st
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.frames import FrameReader, framed
 from tests.examples import examples
-from tests.firmware.board import Board, Built, Pace
+from tests.firmware.board import KINDS, Board, Built, Kind, Pace
 from tests.firmware.talk import Talk
 
-COUNT_M = 7.669904e-6
+STEP_N = 0.012
+"""Half a step of the PWM, where it is coarsest."""
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> Kind:
+    found: Kind = request.param
+    return found
 
 
 @pytest.fixture
-def board(start_board: Callable[[Pace], Board]) -> Board:
-    return start_board("steps")
+def board(start_board: Callable[[Pace, Kind], Board], kind: Kind) -> Board:
+    return start_board("steps", kind)
 
 
 def test_the_firmware_leaves_half_of_flash_and_ram_free(
-    built: Built, record_property: Callable[[str, object], None]
+    built: Callable[[Kind], Built], kind: Kind, record_property: Callable[[str, object], None]
 ) -> None:
-    used = {name: float(percent) for name, percent in re.findall(r"(\w+):\s+\d+ bytes \((\d+\.\d)% Full\)", built.size)}
+    size = built(kind).size
+    used = {name: float(percent) for name, percent in re.findall(r"(\w+):\s+\d+ bytes \((\d+\.\d)% Full\)", size)}
     record_property("flash_percent", used["Program"])
     record_property("ram_percent", used["Data"])
-    print(built.size)  # noqa: T201 - the figures, for whoever runs this with -s
+    print(kind, size)  # noqa: T201 - the figures, for whoever runs this with -s
     assert 1.0 < used["Program"] < 50.0
     assert 1.0 < used["Data"] < 50.0
-
-
-def test_it_says_what_it_is(board: Board) -> None:
-    with Talk(board) as host:
-        identity = host.greet()
-        assert (identity.axes, identity.model, identity.host_silence_ms) == (1, "serial-rig", 20)
-        (axis,) = host.say(lambda sequence: messages.describe(sequence, 0), 2000)
-        assert isinstance(axis, messages.Axis)
-        assert axis.count_pm * 1e-12 == pytest.approx(COUNT_M, abs=1e-12)
-        assert axis.max_force_un == 5_000_000
-
-
-@pytest.mark.parametrize("newton", [1.0, -2.5, 5.0, -5.0, 0.0125])
-def test_a_force_arrives_at_the_motor_and_moves_the_handle_its_way(board: Board, newton: float) -> None:
-    with Talk(board) as host:
-        host.greet()
-        assert host.state(messages.enable).flags & messages.ENABLED
-        for _ in range(10):
-            state = host.push(newton)
-        truth = board.state()
-        assert state.force_un == [round(newton * 1e6)]
-        assert truth.motor_n == pytest.approx(newton, abs=0.00625)  # half a step of the PWM
-        assert truth.position_m * newton > 0.0
-        assert abs(host.poll().position[0]) in range(abs(truth.counts), abs(board.state().counts) + 1)
 
 
 def test_no_force_before_enable_and_none_after_disable(board: Board) -> None:
@@ -68,7 +52,7 @@ def test_no_force_before_enable_and_none_after_disable(board: Board) -> None:
         assert board.state().motor_n == 0.0
         host.state(messages.enable)
         host.push(3.0)
-        assert board.state().motor_n == pytest.approx(3.0)
+        assert board.state().motor_n == pytest.approx(3.0, abs=STEP_N)
         host.state(messages.disable)
         assert board.state().motor_n == 0.0
 
@@ -79,7 +63,7 @@ def test_the_watchdog_stops_the_motor_and_only_enable_brings_it_back(board: Boar
         host.state(messages.enable)
         host.push(2.0)
         board.run(18_000)
-        assert board.state().motor_n == pytest.approx(2.0)
+        assert board.state().motor_n == pytest.approx(2.0, abs=STEP_N)
         board.run(3_000)
         assert board.state().motor_n == 0.0
 
@@ -94,7 +78,7 @@ def test_the_watchdog_stops_the_motor_and_only_enable_brings_it_back(board: Boar
         assert again.flags & messages.ENABLED
         assert not again.flags & messages.TRIPPED
         host.push(2.0)
-        assert board.state().motor_n == pytest.approx(2.0)
+        assert board.state().motor_n == pytest.approx(2.0, abs=STEP_N)
 
 
 FLOODS = {
@@ -130,7 +114,7 @@ def test_the_watchdog_stops_the_motor_however_full_the_line_is_and_however_the_h
         for _ in range(3):
             host.raw(bytes(itertools.islice(line, 50)), 500.0)
         after = board.state()
-        assert before.motor_n == pytest.approx(2.0)
+        assert before.motor_n == pytest.approx(2.0, abs=STEP_N)
         assert after.motor_n == 0.0
         assert before.velocity_m_per_s == pytest.approx(speed_m_per_s, abs=0.01)
 
@@ -146,79 +130,6 @@ def test_a_thousand_ticks_of_a_millisecond_each_bring_a_state_each(board: Board)
             assert last.flags & messages.ENABLED
         assert last.sequence - begin.sequence & 0xFFFF == 1000
         assert (last.time_us - begin.time_us) % 2**32 == pytest.approx(1_000_000, rel=0.02)
-
-
-def test_no_count_is_lost_at_a_metre_a_second(board: Board) -> None:
-    """130000 edges a second, faster than a hand moves a handle, while the line is in use."""
-    board.plant(mass_kg=0.01, damping_n_s_per_m=10.0)
-    with Talk(board) as host:
-        host.greet()
-        for newton in (10.0, -10.0, 10.0):
-            board.hand(newton)
-            for _ in range(120):
-                assert host.poll().fault == 0
-            assert board.state().position_m * newton > 0.049 * 10.0
-        assert host.poll().position == [board.state().counts]
-
-
-@pytest.mark.parametrize(("phase_error_deg", "speed_m_per_s"), [(18.0, 0.8), (-18.0, 0.8), (45.0, 0.5), (-45.0, 0.5)])
-def test_with_a_phase_error_no_count_is_lost_at_a_speed_that_is_lower_by_its_share_of_a_quarter(
-    board: Board, phase_error_deg: float, speed_m_per_s: float
-) -> None:
-    """What counts is the time between two edges that come close; 45 degrees are what good encoders are allowed."""
-    board.misalign_encoder(phase_error_deg)
-    board.plant(mass_kg=0.01, damping_n_s_per_m=10.0)
-    with Talk(board) as host:
-        host.greet()
-        for newton in (10.0 * speed_m_per_s, -10.0 * speed_m_per_s, 10.0 * speed_m_per_s):
-            board.hand(newton)
-            for _ in range(240):
-                assert host.poll().fault == 0
-            assert board.state().position_m * newton > 0.049 * abs(newton)
-        assert host.poll().position == [board.state().counts]
-
-
-@pytest.mark.parametrize("phase_error_deg", [18.0, 45.0])
-def test_at_a_metre_a_second_such_an_encoder_is_a_fault_and_not_a_wrong_position(
-    board: Board, phase_error_deg: float
-) -> None:
-    board.misalign_encoder(phase_error_deg)
-    board.plant(mass_kg=0.01, damping_n_s_per_m=10.0)
-    with Talk(board) as host:
-        host.greet()
-        board.hand(10.0)
-        heard = [said for _ in range(50) for said in host.say(lambda sequence: messages.poll(sequence, 0))]
-        assert [said.fault for said in heard if isinstance(said, messages.Fault)] == [1]
-
-
-def test_counts_that_are_lost_are_a_fault_and_not_a_wrong_position(board: Board) -> None:
-    board.plant(mass_kg=0.01, damping_n_s_per_m=1.0)
-    with Talk(board) as host:
-        host.greet()
-        host.say(lambda sequence: messages.set_home(sequence, 0, 0))
-        assert host.state(messages.enable).flags & messages.HOMED
-        board.hand(20.0)  # up to 14 m/s
-        heard = [said for _ in range(20) for said in host.say(lambda sequence: messages.force(sequence, 0, [0]))]
-        assert [said.fault for said in heard if isinstance(said, messages.Fault)] == [1]
-        last = host.poll()
-        assert last.fault == 1
-        assert not last.flags & (messages.ENABLED | messages.HOMED)
-
-
-def test_the_home_switch_is_closed_at_the_lower_end_stop_only(board: Board) -> None:
-    with Talk(board) as host:
-        host.greet()
-        assert not host.poll().flags & messages.HOME_SWITCH_CLOSED
-        board.hand(-0.5)
-        board.run(1_000_000)
-        assert host.poll().flags & messages.HOME_SWITCH_CLOSED
-        board.hand(0.5)
-        board.run(50_000)
-        assert not host.poll().flags & messages.HOME_SWITCH_CLOSED
-        board.press(True)
-        assert host.poll().buttons == 1
-        board.press(False)
-        assert host.poll().buttons == 0
 
 
 def test_the_ttl_input_goes_with_every_state(board: Board) -> None:
@@ -267,17 +178,17 @@ def test_a_reversed_motor_moves_the_handle_the_wrong_way(board: Board) -> None:
     board.reverse_motor(True)
     with Talk(board) as host:
         host.greet()
-        host.state(messages.enable)
+        begin = host.state(messages.enable).position[0]
         for _ in range(20):
             host.push(0.5)
-        assert host.poll().position[0] < 0
+        assert host.poll().position[0] < begin
 
 
 def test_a_program_that_hangs_is_reset_and_says_so(board: Board) -> None:
     with Talk(board) as host:
         host.greet()
         host.state(messages.enable)
-        host.push(4.0)
+        host.push(3.0)
         board.hang()
         board.run(30_000)
         truth = board.state()
@@ -290,17 +201,6 @@ def test_a_program_that_hangs_is_reset_and_says_so(board: Board) -> None:
         assert host.push(1.0).force_un == [0]
         assert host.state(messages.disable).fault == 0
         assert host.state(messages.enable).flags & messages.ENABLED
-
-
-def test_a_broken_wire_of_the_encoder_is_no_motion_and_no_force_beyond_the_limit(board: Board) -> None:
-    """With one channel dead the count only toggles: the firmware cannot know, the host must (its sign check does)."""
-    board.break_encoder(True)
-    with Talk(board) as host:
-        host.greet()
-        board.hand(2.0)
-        board.run(100_000)
-        assert abs(board.state().counts) > 100
-        assert abs(host.poll().position[0]) <= 1
 
 
 def test_an_unplugged_rig_is_without_force_and_comes_back_as_just_switched_on(board: Board) -> None:
@@ -335,9 +235,9 @@ def test_after_any_garbage_the_second_frame_is_understood(board: Board, garbage:
 
 
 def test_at_the_pace_of_frames_a_tick_is_a_millisecond_however_slow_the_host(
-    start_board: Callable[[Pace], Board],
+    start_board: Callable[[Pace, Kind], Board],
 ) -> None:
-    board = start_board("frames")
+    board = start_board("frames", "uno")
     with serial.Serial(str(board.port), 1_000_000, timeout=60.0) as port:
         board.run(5000)
         reader = FrameReader()
@@ -354,8 +254,8 @@ def test_at_the_pace_of_frames_a_tick_is_a_millisecond_however_slow_the_host(
             port.write(framed(messages.poll(tick, 0)))
 
 
-def test_in_real_time_the_motor_stops_when_the_host_falls_silent(start_board: Callable[[Pace], Board]) -> None:
-    board = start_board("real")
+def test_in_real_time_the_motor_stops_when_the_host_falls_silent(start_board: Callable[[Pace, Kind], Board]) -> None:
+    board = start_board("real", "uno")
     with serial.Serial(str(board.port), 1_000_000, timeout=0.01) as port:
         reader = FrameReader()
         sequence = 0
@@ -373,16 +273,3 @@ def test_in_real_time_the_motor_stops_when_the_host_falls_silent(start_board: Ca
             heard = [messages.decode(message) for message in reader.feed(port.read(200))]
             states += [said for said in heard if isinstance(said, messages.State)]
         assert states[-1].flags == messages.TRIPPED
-
-
-def test_a_handle_may_stand_anywhere_when_the_rig_is_switched_on(board: Board) -> None:
-    board.place(-0.02)
-    with Talk(board) as host:
-        host.greet()
-        assert host.poll().position == [0]
-        assert board.state().position_m == pytest.approx(-0.02)
-        board.hand(0.5)
-        board.run(100_000)
-        state = host.poll()
-        assert state.fault == 0
-        assert state.position[0] * COUNT_M == pytest.approx(board.state().position_m + 0.02, abs=5e-4)

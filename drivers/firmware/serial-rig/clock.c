@@ -9,15 +9,15 @@ enum { TURN_US = 128 };
 
 static volatile uint32_t turns_us;
 
-ISR(TIMER0_OVF_vect)
+ISR(TIMER2_OVF_vect)
 {
     turns_us += TURN_US;
 }
 
 void clock_start(void)
 {
-    TCCR0B = 1 << CS01; /* 16 MHz / 8 */
-    TIMSK0 = 1 << TOIE0;
+    TCCR2B = 1 << CS21; /* 16 MHz / 8 */
+    TIMSK2 = 1 << TOIE2;
 }
 
 uint32_t clock_us(void)
@@ -27,8 +27,8 @@ uint32_t clock_us(void)
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
         us = turns_us;
-        half_us = TCNT0;
-        if ((TIFR0 & 1 << TOV0) && half_us < 128) {
+        half_us = TCNT2;
+        if ((TIFR2 & 1 << TOV2) && half_us < 128) {
             us += TURN_US; /* turned over with the interrupt still waiting */
         }
     }

@@ -1,4 +1,4 @@
-/* Microseconds since power-up from timer 0. */
+/* Microseconds since power-up from timer 2. */
 #ifndef CLOCK_H
 #define CLOCK_H
 

@@ -1,23 +1,25 @@
-/* One-axis rig on an ATmega328P: the protocol core, and this board behind it. */
+/* One-axis rig on an ATmega328P: the protocol core, and behind it the board in whose folder `board.h` is. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/wdt.h>
 
 #include "board.h"
 #include "clock.h"
-#include "encoder.h"
 #include "frame.h"
 #include "motor.h"
 #include "rig.h"
+#include "sensor.h"
 #include "uart.h"
 
 static const struct rig_description DESCRIPTION = {
     .axes = 1,
+#ifdef HOME_SWITCH
     .capabilities = RIG_HAS_HOME_SWITCH,
+#endif
     .buttons = 2, /* the push button, and the TTL input */
     .host_silence_ms = HOST_SILENCE_MS,
     .nominal_rate_hz = NOMINAL_RATE_HZ,
-    .firmware = {1, 1, 0},
+    .firmware = {1, 2, 0},
     .model = MODEL,
     .serial = SERIAL,
     .axis = {{COUNT_PM, MAX_FORCE_UN, LOWEST_COUNTS, HIGHEST_COUNTS}},
@@ -45,7 +47,7 @@ static int32_t position(void *board, uint8_t axis)
 {
     (void)board;
     (void)axis;
-    return encoder_counts();
+    return sensor_counts();
 }
 
 static uint16_t buttons(void *board)
@@ -57,7 +59,11 @@ static uint16_t buttons(void *board)
 static bool home_switch(void *board)
 {
     (void)board;
+#ifdef HOME_SWITCH
     return !(PIND & 1 << HOME_SWITCH);
+#else
+    return false;
+#endif
 }
 
 static void turn_sync(void *board)
@@ -77,9 +83,9 @@ static bool problem(void *board, struct rig_problem *problem)
 {
     (void)board;
     problem->axis = 0;
-    if (encoder_slipped()) {
+    if (sensor_slipped()) {
         problem->fault = RIG_SENSOR_FAULT;
-        problem->detail = encoder_counts();
+        problem->detail = sensor_counts();
         return true;
     }
     bool switched_on = reset_cause & 1 << PORF; /* brown-out may be set as well while the supply rises */
@@ -95,7 +101,7 @@ static bool problem(void *board, struct rig_problem *problem)
 static void forget_problem(void *board)
 {
     (void)board;
-    encoder_forget();
+    sensor_forget();
     reset_cause = 0;
 }
 
@@ -119,10 +125,13 @@ int main(void)
     uint8_t at_once = 0;
 
     motor_start(); /* first of all: the pins are driven low */
-    PORTD |= 1 << HOME_SWITCH | 1 << BUTTON | 1 << TTL_INPUT;
+    PORTD |= 1 << BUTTON | 1 << TTL_INPUT;
+#ifdef HOME_SWITCH
+    PORTD |= 1 << HOME_SWITCH;
+#endif
     DDRD |= 1 << SYNC_OUTPUT;
     clock_start();
-    encoder_start();
+    sensor_start();
     uart_start();
     wdt_enable(WDTO_15MS); /* a program that hangs resets the processor, and reset lets go of the motor */
     sei();

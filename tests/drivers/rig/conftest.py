@@ -31,3 +31,8 @@ def rig(rig_core: ctypes.CDLL, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.fixture(scope="session")
 def board_parts(tmp_path_factory: pytest.TempPathFactory) -> Built:
     return build_board(tmp_path_factory.mktemp("board"))
+
+
+@pytest.fixture(scope="session")
+def hapkit_parts(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    return build_board(tmp_path_factory.mktemp("hapkit"), "hapkit")

@@ -2,35 +2,29 @@
 
 #include <math.h>
 
-/* 4096 counts a turn of a drum of 10 mm, as drivers/firmware/serial-rig/board.h has it. */
-static const double COUNTS_PER_M = 4096 / (3.14159265358979323846 * 0.010);
-
-const struct handle HANDLE = {.mass_kg = 0.1, .damping_n_s_per_m = 1.0};
-
 void handle_move(struct handle *handle, double dt_s)
 {
-    const double stop_m = STOP_COUNTS / COUNTS_PER_M;
     double grip_n = -handle->grip_stiffness_n_per_m * (handle->position_m - handle->grip_rest_m) -
                     handle->grip_damping_n_s_per_m * handle->velocity_m_per_s;
     double force_n = handle->motor_n + handle->hand_n + grip_n - handle->damping_n_s_per_m * handle->velocity_m_per_s;
     /* Semi-implicit Euler: a microsecond a step is short against everything that is here. */
     handle->velocity_m_per_s += force_n / handle->mass_kg * dt_s;
     handle->position_m += handle->velocity_m_per_s * dt_s;
-    if (fabs(handle->position_m) > stop_m) { /* no bounce */
-        handle->position_m = copysign(stop_m, handle->position_m);
+    if (fabs(handle->position_m) > handle->stop_m) { /* no bounce */
+        handle->position_m = copysign(handle->stop_m, handle->position_m);
         handle->velocity_m_per_s = 0.0;
     }
 }
 
 long handle_counts(const struct handle *handle)
 {
-    return lrint(handle->position_m * COUNTS_PER_M);
+    return lrint(handle->position_m * handle->counts_per_m);
 }
 
 /* How many edges the disc has passed: those of channel A lie two counts apart, and one of B between each two of them. */
 static long edges_passed(const struct handle *handle)
 {
-    double counts = handle->position_m * COUNTS_PER_M - (double)handle->offset;
+    double counts = handle->position_m * handle->counts_per_m - (double)handle->offset;
     double before = 2.0 * floor((counts - 0.5) / 2.0) + 0.5; /* the last edge of A */
     bool passed_b = counts >= before + 1.0 + handle->phase_error_deg / 90.0;
     return lround(before + 0.5) + passed_b;

@@ -1,8 +1,9 @@
 /* A rig on the desk that is none: the real firmware on a simulated ATmega328P, a handle of one mass behind its pins,
  * its serial line on a pty. Commands come on stdin, one a line, and each is answered by one line on stdout.
  *
- *   board FIRMWARE.elf PACE LINK
+ *   board WIRING FIRMWARE.elf PACE LINK
  *
+ * WIRING is uno or hapkit.
  * PACE says how simulated time passes:
  *   real     with the clock, but never faster: a machine that is late makes the rig slow, it does not replay
  *   frames   1 ms for each frame from the host; after 0.3 s without one, with the clock
@@ -24,6 +25,7 @@
 #include "handle.h"
 #include "line.h"
 #include "processor.h"
+#include "wiring.h"
 
 static const double FRAME_US = 1000.0;      /* what a frame is worth at the pace of frames */
 static const double PATIENCE_US = 300000.0; /* after which silence is no late host but a silent one */
@@ -146,6 +148,10 @@ static void obey(const char *command)
         handle.broken_wire = a != 0.0;
     } else if (strcmp(word, "phase-error") == 0) {
         handle.phase_error_deg = a;
+    } else if (strcmp(word, "magnet") == 0) {
+        handle.offset += (long)a;
+    } else if (strcmp(word, "bend") == 0) {
+        handle.bend = a;
     } else if (strcmp(word, "button") == 0) {
         handle.button = a != 0.0;
     } else if (strcmp(word, "ttl") == 0) {
@@ -198,18 +204,23 @@ static void wait_for_something(enum pace pace)
 int main(int argc, char **argv)
 {
     static const char *const PACES[] = {[REAL] = "real", [FRAMES] = "frames", [STEPS] = "steps"};
+    static const struct wiring *const WIRINGS[] = {&UNO, &HAPKIT};
+    const struct wiring *wiring = NULL;
     int pace = -1;
-    for (int i = REAL; argc == 4 && i <= STEPS; i++) {
-        pace = strcmp(argv[2], PACES[i]) == 0 ? i : pace;
+    for (int i = 0; argc == 5 && i < 2; i++) {
+        wiring = strcmp(argv[1], WIRINGS[i]->name) == 0 ? WIRINGS[i] : wiring;
     }
-    if (pace < 0) {
-        fprintf(stderr, "usage: board FIRMWARE.elf real|frames|steps LINK\n");
+    for (int i = REAL; argc == 5 && i <= STEPS; i++) {
+        pace = strcmp(argv[3], PACES[i]) == 0 ? i : pace;
+    }
+    if (pace < 0 || wiring == NULL) {
+        fprintf(stderr, "usage: board uno|hapkit FIRMWARE.elf real|frames|steps LINK\n");
         return 2;
     }
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    handle = HANDLE;
-    processor = processor_new(argv[1], &handle);
-    port = argv[3];
+    handle = wiring->handle;
+    processor = processor_new(argv[2], wiring, &handle);
+    port = argv[4];
     plug();
     printf("ready\n");
     fflush(stdout);

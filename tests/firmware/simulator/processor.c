@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include <simavr/avr_adc.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_uart.h>
 #include <simavr/sim_avr.h>
@@ -17,20 +18,14 @@ enum {
     SAID = 4096,
 };
 
-/* Data addresses of what drives the motor (ATmega328P data sheet, register summary). */
-enum { DDRB = 0x24, PORTB = 0x25, DDRD = 0x2a, PORTD = 0x2b, TCCR1A = 0x80, TCCR1B = 0x81, ICR1L = 0x86, OCR1AL = 0x88 };
-enum { PIN_PWM = 1, PIN_DIRECTION = 2 };                /* of port B */
-enum { PIN_A = 2, PIN_B = 3, PIN_HOME_SWITCH = 4, PIN_BUTTON = 5, PIN_TTL = 6, PIN_SYNC = 7 }; /* of port D */
-enum { OUTSIDE = 1 << PIN_A | 1 << PIN_B | 1 << PIN_HOME_SWITCH | 1 << PIN_BUTTON | 1 << PIN_TTL };
-
-static const double FULL_FORCE_N = 5.0; /* at a duty of 1, as drivers/firmware/serial-rig/board.h has it */
-
 struct processor {
     avr_t *avr; /* NULL while it is switched off */
     elf_firmware_t firmware;
     struct handle *handle;
-    avr_irq_t *port_d[8], *uart_in;
+    const struct wiring *wiring;
+    avr_irq_t *port_d[8], *uart_in, *analog;
     unsigned levels; /* that the pins of port D show */
+    uint32_t millivolts;
     bool fifo_is_full;
     avr_cycle_count_t next_byte;
     uint8_t said[SAID];
@@ -42,42 +37,28 @@ struct processor {
 
 static struct processor the_processor; /* simavr's reset hook has no argument of ours */
 
-static unsigned data16(const struct processor *processor, unsigned low)
+static void show_pins(struct processor *processor, double dt_s)
 {
-    return processor->avr->data[low] | (unsigned)processor->avr->data[low + 1] << 8;
-}
-
-/* What the bridge makes of its two pins: nothing at all unless the timer really drives them. */
-static double motor_force_n(const struct processor *processor)
-{
-    const uint8_t *data = processor->avr->data;
-    unsigned both = 1 << PIN_PWM | 1 << PIN_DIRECTION;
-    unsigned top = data16(processor, ICR1L);
-    bool phase_correct = (data[TCCR1A] & 0x83) == 0x82 && (data[TCCR1B] & 0x1f) == 0x11;
-    if (!phase_correct || (data[DDRB] & both) != both || top == 0) {
-        return 0.0;
+    const struct wiring *wiring = processor->wiring;
+    unsigned levels = wiring->levels(processor->handle);
+    if (wiring->millivolts != NULL) {
+        uint32_t now = (uint32_t)wiring->millivolts(processor->handle, processor->avr->data, dt_s);
+        if (now != processor->millivolts) {
+            processor->millivolts = now;
+            avr_raise_irq(processor->analog, now);
+        }
     }
-    double duty = fmin(1.0, (double)data16(processor, OCR1AL) / top);
-    bool forwards = data[PORTB] >> PIN_DIRECTION & 1;
-    return (forwards == processor->handle->reversed ? -duty : duty) * FULL_FORCE_N;
-}
-
-static void show_pins(struct processor *processor)
-{
-    unsigned channels = handle_channels(processor->handle);
-    bool at_lower_stop = handle_counts(processor->handle) <= -STOP_COUNTS;
-    unsigned levels = (channels & 1) << PIN_A | channels >> 1 << PIN_B | (unsigned)!at_lower_stop << PIN_HOME_SWITCH |
-                      (unsigned)!processor->handle->button << PIN_BUTTON |
-                      (unsigned)processor->handle->ttl << PIN_TTL;
     if (levels == processor->levels) {
         return;
     }
     processor->levels = levels;
     /* What drives a pin from outside wins over the pull-up that the firmware switches on. */
-    avr_ioport_external_t outside = {.name = 'D', .mask = OUTSIDE, .value = levels};
+    avr_ioport_external_t outside = {.name = 'D', .mask = wiring->outside, .value = levels};
     avr_ioctl(processor->avr, AVR_IOCTL_IOPORT_SET_EXTERNAL('D'), &outside);
-    for (unsigned pin = PIN_A; pin <= PIN_TTL; pin++) {
-        avr_raise_irq(processor->port_d[pin], levels >> pin & 1);
+    for (unsigned pin = 0; pin < 8; pin++) {
+        if (wiring->outside >> pin & 1) {
+            avr_raise_irq(processor->port_d[pin], levels >> pin & 1);
+        }
     }
 }
 
@@ -116,13 +97,14 @@ static void count_reset(avr_t *avr)
     the_processor.resets++;
 }
 
-struct processor *processor_new(const char *firmware, struct handle *handle)
+struct processor *processor_new(const char *firmware, const struct wiring *wiring, struct handle *handle)
 {
     avr_global_logger_set(errors_only);
     if (elf_read_firmware(firmware, &the_processor.firmware) != 0) {
         fprintf(stderr, "%s is no firmware\n", firmware);
         exit(1);
     }
+    the_processor.wiring = wiring;
     the_processor.handle = handle;
     return &the_processor;
 }
@@ -134,6 +116,7 @@ void processor_switch_on(struct processor *processor)
     avr_init(avr);
     avr_load_firmware(avr, &processor->firmware);
     avr->frequency = CYCLES_PER_US * 1000000;
+    avr->vcc = avr->avcc = avr->aref = 5000;
     avr->log = LOG_ERROR;
     avr->reset = count_reset;
     processor->avr = avr;
@@ -155,8 +138,10 @@ void processor_switch_on(struct processor *processor)
     for (int pin = 0; pin < 8; pin++) {
         processor->port_d[pin] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), pin);
     }
+    processor->analog = avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC2);
     processor->levels = ~0u; /* unlike any */
-    show_pins(processor);
+    processor->millivolts = ~0u;
+    show_pins(processor, 0.0);
 }
 
 void processor_switch_off(struct processor *processor)
@@ -176,7 +161,8 @@ bool processor_is_on(const struct processor *processor)
 static void look_at_sync(struct processor *processor)
 {
     const uint8_t *data = processor->avr->data;
-    bool level = data[DDRD] >> PIN_SYNC & 1 && data[PORTD] >> PIN_SYNC & 1;
+    uint8_t pin = processor->wiring->sync_pin;
+    bool level = data[DDRD] >> pin & 1 && data[PORTD] >> pin & 1;
     processor->syncs += level != processor->sync_level;
     processor->sync_level = level;
 }
@@ -193,10 +179,11 @@ double processor_run(struct processor *processor)
         }
     }
     double us = (double)(avr->cycle - begin) / CYCLES_PER_US;
-    processor->handle->motor_n = motor_force_n(processor);
+    double motor_n = processor->wiring->motor_n(avr->data);
+    processor->handle->motor_n = processor->handle->reversed ? -motor_n : motor_n;
     look_at_sync(processor);
     handle_move(processor->handle, us * 1e-6);
-    show_pins(processor);
+    show_pins(processor, us * 1e-6);
     return us;
 }
 

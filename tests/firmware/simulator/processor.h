@@ -6,11 +6,12 @@
 #include <stdint.h>
 
 #include "handle.h"
+#include "wiring.h"
 
 struct processor;
 
 /* Load the firmware. Ends the program when it is none. */
-struct processor *processor_new(const char *firmware, struct handle *handle);
+struct processor *processor_new(const char *firmware, const struct wiring *wiring, struct handle *handle);
 
 void processor_switch_on(struct processor *processor);
 void processor_switch_off(struct processor *processor);

@@ -1,4 +1,4 @@
-#include "encoder.h"
+#include "sensor.h"
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -36,13 +36,13 @@ ISR(INT0_vect)
 
 ISR(INT1_vect, ISR_ALIASOF(INT0_vect));
 
-ISR(TIMER0_COMPA_vect)
+ISR(TIMER2_COMPA_vect)
 {
     older += recent;
     recent = 0;
 }
 
-void encoder_start(void)
+void sensor_start(void)
 {
     PORTD |= 1 << ENCODER_A | 1 << ENCODER_B; /* pull-ups, for open collectors */
     _delay_us(100);                           /* and the time that they need with a long cable */
@@ -50,10 +50,10 @@ void encoder_start(void)
     EIFR = 1 << INTF0 | 1 << INTF1;
     last = channels();
     EIMSK = 1 << INT0 | 1 << INT1;
-    TIMSK0 |= 1 << OCIE0A; /* of the clock's timer, which turns over every 128 us */
+    TIMSK2 |= 1 << OCIE2A; /* of the clock's timer, which turns over every 128 us */
 }
 
-int32_t encoder_counts(void)
+int32_t sensor_counts(void)
 {
     int32_t now;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
@@ -63,12 +63,12 @@ int32_t encoder_counts(void)
     return now;
 }
 
-bool encoder_slipped(void)
+bool sensor_slipped(void)
 {
     return slipped;
 }
 
-void encoder_forget(void)
+void sensor_forget(void)
 {
     slipped = false;
 }
