@@ -2,33 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 from hapticd.config.models import SceneConfig
 from hapticd.config.objects import HOLD_S, MAX_SPEED_M_PER_S
+from hapticd.config.remote import PortLimits
 
-
-@dataclass(frozen=True, slots=True)
-class PortLimits:
-    """One thing in a scene that a client may drive, and how far.
-
-    Attributes:
-        name: who it is.
-        kind: what it is.
-        hold_s: how long an update is good [s].
-        stiffness_n_per_m, damping_n_s_per_m: in force until a client says otherwise, and the most it may ask for.
-        max_force_n: largest force on the device [N]; 0: an object has no limit but the guard's.
-        max_speed_m_per_s: how fast it is followed [m/s]; 0: a force goes nowhere.
-    """
-
-    name: str
-    kind: Literal["object", "coupling", "force"]
-    hold_s: float
-    stiffness_n_per_m: float
-    damping_n_s_per_m: float
-    max_force_n: float
-    max_speed_m_per_s: float
+__all__ = ["PortLimits", "port_limits"]
 
 
 def port_limits(scene: SceneConfig) -> list[PortLimits]:
@@ -59,5 +37,8 @@ def port_limits(scene: SceneConfig) -> list[PortLimits]:
             )
             for each in scene.couplings
         ),
-        *(PortLimits(each.name, "force", each.hold_s, 0.0, 0.0, each.max_force_n, 0.0) for each in scene.forces),
+        *(
+            PortLimits(each.name, "force", each.hold_s, 0.0, 0.0, each.max_force_n, 0.0, each.unchanged_s)
+            for each in scene.forces
+        ),
     ]

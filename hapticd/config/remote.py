@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 from pydantic import Field
 
@@ -48,6 +50,30 @@ class ForceConfig(Table):
         description="how long a force may stay the same, however often it is sent: a client that hangs sends its "
         "last one for ever [s]; 0: as long as it is sent",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class PortLimits:
+    """One thing in a scene that a client may drive, and how far.
+
+    Attributes:
+        name: who it is.
+        kind: what it is.
+        hold_s: how long an update is good [s].
+        stiffness_n_per_m, damping_n_s_per_m: in force until a client says otherwise, and the most it may ask for.
+        max_force_n: largest force on the device [N]; 0: an object has no limit but the guard's.
+        max_speed_m_per_s: how fast it is followed [m/s]; 0: a force goes nowhere.
+        unchanged_s: how long a force may stay the same [s]; 0: as long as it is sent.
+    """
+
+    name: str
+    kind: Literal["object", "coupling", "force"]
+    hold_s: float
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+    max_force_n: float
+    max_speed_m_per_s: float
+    unchanged_s: float = 0.0
 
 
 def check_ports(objects: Iterable[str], couplings: Sequence[CouplingConfig], forces: Sequence[ForceConfig]) -> None:

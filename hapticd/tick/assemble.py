@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from hapticd.config.loading import LoadedConfig
+from hapticd.config.remote import PortLimits
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.guard import Guard
+from hapticd.tick.remote.coupling import Coupling
+from hapticd.tick.remote.streamed_force import StreamedForce
 from hapticd.tick.space.tick import SpaceTick
 from hapticd.tick.tick import ControlTick
 
@@ -30,9 +33,15 @@ def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
             lambda: RunningLaw(config.law, config.params),
             settings.loop.period_s,
             settings.safety.ramp_s,
+            make_port,
         )
     except ConfigError as error:
         raise ConfigError(*(f"{config.path}: {problem}" for problem in error.problems)) from None
+
+
+def make_port(limits: PortLimits, *parts: Any) -> Coupling | StreamedForce:
+    """A coupling or a force, from the parts that a tick gives it."""
+    return (Coupling if limits.kind == "coupling" else StreamedForce)(limits, *parts)
 
 
 def place_device(config: LoadedConfig, driver: Any) -> None:

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING
 
 from hapticd.config.models import SceneConfig, VelocityConfig
+from hapticd.config.ports import PortLimits, port_limits
 from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo, Sample
+from hapticd.errors import ConfigError
 from hapticd.tick import fallback
 from hapticd.tick.arrangement import Arrangement, arrange
 from hapticd.tick.contact import Contact, RunningLaw
@@ -21,7 +24,17 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
 from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, let_out, limits
 from hapticd.tick.motion import Motion
+from hapticd.tick.remote.port import Port
+from hapticd.tick.remote.ports import PortArrangement, arrange_ports, axes_of
 from hapticd.tick.scene import check_objects, compile_walls
+from hapticd.tick.space.books import Totals
+
+if TYPE_CHECKING:  # what a scene without couplings and forces never loads
+    from hapticd.tick.remote.one_port import OnePort
+
+MakePort = Callable[[PortLimits, Motion, Callable[[], RunningLaw], float, float, float], "OnePort"]
+"""Makes a coupling or a force: its limits, where the device is, a fresh law, the device's resolution [m], the period
+[s], the duration of its ramps [s]."""
 
 _IMPOSSIBLE = "the device reported a position that is not possible"
 _LOST = "the device does not know any more where it is"
@@ -41,6 +54,7 @@ class ControlTick:
         make_law: a fresh law, one a contact.
         period_s: nominal time between ticks [s].
         ramp_s: duration of every ramp [s].
+        make_port: a coupling or a force.
 
     Attributes:
         motion: where the device is and how fast, as used by the last tick.
@@ -53,6 +67,9 @@ class ControlTick:
         fault_text: what there is to say about it.
         advance: what a loop calls each tick: `step`, or what else a scene needs.
         has_objects: whether the scene has objects in space.
+        ports: what clients drive, in scene order: objects, couplings, forces.
+        couplings: of these the ones that pull by themselves, couplings and forces.
+        has_ports: whether there are such, or were.
 
     Raises:
         ConfigError: the scene or the way to find the velocity does not fit the device.
@@ -67,6 +84,7 @@ class ControlTick:
         make_law: Callable[[], RunningLaw],
         period_s: float,
         ramp_s: float,
+        make_port: MakePort | None = None,
     ) -> None:
         check_objects(scene.objects, info)
         axes = len(info.axes)
@@ -83,19 +101,26 @@ class ControlTick:
         self.past = EnergyLedger()
         self.force_n = [0.0] * axes
         self.requested_n = [0.0] * axes
-        self.fallback = self.has_objects = False
+        self.fallback = self.has_objects = self.has_ports = False
         self.fault = 0
         self.fault_text = ""
         self._last_fault = 0
         self._axes = range(axes)
         self._simulated = info.simulated
-        self._active = self.contacts  # and those that leave
+        self._make_port = make_port
+        self.couplings: list[OnePort] = [
+            self._port(port, make_law) for port in port_limits(scene) if port.kind != "object"
+        ]
+        self.leaving_ports: list[OnePort] = []
+        self.past_ports = Totals()
+        self._gather()
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         self._blind = True
         self._excused = False
         self._blind_gain = 0.0
         self._blind_from_n = [0.0] * axes
         self.motion.watch_speed(guard.max_speed_m_per_s < math.inf)
+        self.ports: list[Port]
         self.advance: Callable[[Sample, float], list[float]] = self.step
 
     @property
@@ -181,15 +206,18 @@ class ControlTick:
             limits(safety, self.info)
         make = self.make_law if make_law is None else make_law
         there = Arrangement(self.contacts)
+        ports = PortArrangement(self.couplings)
         if scene is not None:
             check_objects(scene.objects, self.info)
             walls = compile_walls(scene.walls, self.info, self.period_s)
             yield
             there = yield from arrange(walls, self.contacts, self.info, make)
-        laws = [(contact, contact.law) for contact in there.new]
+            ports = yield from arrange_ports(scene, self.couplings, lambda limits: self._port(limits, make))
+        new: list[Contact] = [*there.new, *axes_of(ports.new)]
+        laws = [(contact, contact.law) for contact in new]
         if make_law is not None:
-            for contact in there.contacts:
-                if contact not in there.new:
+            for contact in [*there.contacts, *axes_of(ports.ports)]:
+                if contact not in new:
                     laws.append((contact, make()))
                     yield
         gone = []
@@ -213,12 +241,27 @@ class ControlTick:
             contact.wall = wall
             self._blend(contact)
         self.contacts = there.contacts
-        self._active = self.contacts + self.leaving
+        self._take_ports(ports)
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         if self.fallback:
-            laws = self._start_laws([(contact, self._fallback_law()) for contact in there.new])
+            laws = self._start_laws([(contact, self._fallback_law()) for contact in new])
         for contact, law in laws:
             self._take_law(contact, law)
+
+    def totals(self) -> Totals:
+        """The books of all that there ever was."""
+        totals = Totals()
+        self.add_totals(totals)
+        return totals
+
+    def add_totals(self, totals: Totals) -> None:
+        """Add the books of all walls, couplings and forces there ever were."""
+        totals.ledger.absorb(self.past)
+        for contact in (*self.contacts, *self.leaving):
+            totals.ledger.absorb(contact.ledger)
+        totals.add(self.past_ports)
+        for port in (*self.couplings, *self.leaving_ports):
+            totals.add(port.books)
 
     def release(self, ramp_s: float | None = None) -> None:
         """Ramp the force to zero and stay disarmed."""
@@ -319,7 +362,34 @@ class ControlTick:
         return force_n
 
     def _under_law(self) -> list[Contact]:
-        return self.contacts  # all that have a law of the configuration's
+        return [
+            *self.contacts,
+            *axes_of(self.couplings),
+            *axes_of(self.leaving_ports),
+        ]  # all under a law of [controller]
+
+    def _port(self, limits: PortLimits, make_law: Callable[[], RunningLaw]) -> OnePort:
+        if self._make_port is None:
+            raise ConfigError(f'"{limits.name}": this tick has no {limits.kind}s')
+        return self._make_port(limits, self.motion, make_law, self.info.resolution_m, self.period_s, self.ramp_s)
+
+    def _take_ports(self, arrangement: PortArrangement) -> None:
+        """Go on with other ports; of those that were gone before, the ones that have let go leave the books."""
+        arrangement.take()
+        for port in [port for port in self.leaving_ports if port.asleep]:
+            self.past_ports.add(port.books)
+            self.leaving_ports.remove(port)
+        self.leaving_ports += arrangement.gone
+        self.couplings = arrangement.ports
+        for port in self.couplings:
+            port.set_ramp(self.ramp_s)
+        self._gather()
+
+    def _gather(self) -> None:
+        """Make the lists that the ticks go through."""
+        self._active = [*self.contacts, *self.leaving, *axes_of(self.couplings), *axes_of(self.leaving_ports)]
+        self.ports = list(self.couplings)
+        self.has_ports = self.has_ports or bool(self.ports)  # and their books once they are gone
 
     def _move_origin(self, origin_m: list[float]) -> None:
         self.motion.move_origin(origin_m)

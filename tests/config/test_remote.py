@@ -33,7 +33,7 @@ def test_ports_come_as_objects_couplings_forces_with_their_limits() -> None:
     assert ports(loaded) == [
         PortLimits("ball", "object", 0.1, 800.0, 0.0, 0.0, 0.5),
         PortLimits("tool", "coupling", 0.1, 2000.0, 5.0, 6.0, 1.0),
-        PortLimits("field", "force", 0.05, 0.0, 0.0, 3.0, 0.0),
+        PortLimits("field", "force", 0.05, 0.0, 0.0, 3.0, 0.0, 1.0),
     ]
     assert ports(load(effective_toml(loaded))) == ports(loaded)
     # As it comes to the loop:

@@ -12,9 +12,10 @@ class HasBooks(Protocol):
     """One contact, or sums over several."""
 
     ledger: EnergyLedger
-    moved_j: float
+    carried_j: float
     friction_j: float
     friction_stored_j: float
+    moved_j: float
 
 
 class Totals:
@@ -22,12 +23,17 @@ class Totals:
 
         energy = stored + dissipated - generated - moved
 
+    The ledger of what moves counts energy as seen from there; here it counts as the device gives it.
+
     Attributes:
         ledger: energy, stored, dissipated, generated [J].
-        moved_j: work that changes of the objects did on their springs [J].
+        moved_j: work that motion and changes of the scene did [J].
+        carried_j: nothing is left to take off here [J].
         friction_j: energy that slipping took, a part of what is dissipated [J].
         friction_stored_j: energy in the springs along surfaces, a part of what is stored [J].
     """
+
+    carried_j = 0.0
 
     __slots__ = ("friction_j", "friction_stored_j", "ledger", "moved_j")
 
@@ -40,6 +46,7 @@ class Totals:
     def add(self, contact: HasBooks) -> None:
         """Add one contact, or sums over several."""
         self.ledger.absorb(contact.ledger)
+        self.ledger.energy_j -= contact.carried_j
         self.moved_j += contact.moved_j
         self.friction_j += contact.friction_j
         self.friction_stored_j += contact.friction_stored_j

@@ -46,6 +46,8 @@ class SolidContact:
         depth_m: of the device in the solid [m].
     """
 
+    carried_j = 0.0
+
     __slots__ = (
         "_away",
         "_moved_m",

@@ -19,7 +19,7 @@ from hapticd.tick.space.books import SpaceBooks, Totals
 from hapticd.tick.space.channel import Channel
 from hapticd.tick.space.solid import Solid, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
-from hapticd.tick.tick import ControlTick
+from hapticd.tick.tick import ControlTick, MakePort
 
 _DISARMED, _ARMED = Mode.DISARMED, Mode.ARMED
 
@@ -48,8 +48,9 @@ class SpaceTick(ControlTick):
         make_law: Callable[[], RunningLaw],
         period_s: float,
         ramp_s: float,
+        make_port: MakePort | None = None,
     ) -> None:
-        super().__init__(scene, velocity, guard, info, make_law, period_s, ramp_s)
+        super().__init__(scene, velocity, guard, info, make_law, period_s, ramp_s, make_port)
         self.solids = [
             SolidContact(solid, make_law, info.resolution_m) for solid in compile_objects(scene.objects, period_s)
         ]
@@ -144,11 +145,9 @@ class SpaceTick(ControlTick):
         self._take_solids()
 
     def totals(self) -> Totals:
-        """The books of all walls and objects there ever were."""
+        """The books of all walls, objects, couplings and forces there ever were."""
         totals = self.books.totals(self.awake)
-        totals.ledger.absorb(self.past)
-        for contact in self._active:
-            totals.ledger.absorb(contact.ledger)
+        self.add_totals(totals)
         return totals
 
     def step_in_space(self, sample: Sample, clock_dt_s: float) -> list[float]:
@@ -247,7 +246,7 @@ class SpaceTick(ControlTick):
         return force_n
 
     def _under_law(self) -> list[Contact]:
-        return [*self.contacts, *(channel for contact in self.solids for channel in contact.channels)]
+        return [*super()._under_law(), *(channel for contact in self.solids for channel in contact.channels)]
 
     def _stand(self) -> None:
         super()._stand()

@@ -1,0 +1,93 @@
+"""The books of one port: of its spring, and of what its client's motion and changes put in."""
+
+from __future__ import annotations
+
+from hapticd.tick.energy import EnergyLedger
+
+
+class PortBooks:
+    """What became of the energy at a port.
+
+        energy - carried = stored + dissipated - generated - moved
+
+    Attributes:
+        ledger: its energy counts as seen from the followed target.
+        moved_j: what the client's motion, changes and forces put in, less what they took [J].
+        carried_j: the part of it that is the force's work along the target's way [J].
+        friction_j, friction_stored_j: 0: a port has no friction [J].
+    """
+
+    friction_j = 0.0
+    friction_stored_j = 0.0
+
+    __slots__ = ("_gain", "_limit_n", "_stiffness", "_weight", "carried_j", "ledger", "moved_j")
+
+    def __init__(self) -> None:
+        self.ledger = EnergyLedger()
+        self.moved_j = 0.0
+        self.carried_j = 0.0
+        self._gain = self._weight = self._stiffness = self._limit_n = 0.0
+
+    def carry(self, work_j: float) -> None:
+        """Enter the work of the force that was held along the target's way [J]."""
+        self.carried_j += work_j
+        self.moved_j += work_j
+
+    def give(self, work_j: float) -> None:
+        """Take for the client's own what the ledger has entered as a gain of the device's [J]."""
+        self.moved_j += work_j
+        self.ledger.dissipated_j += work_j
+
+    def enter(
+        self, taken_j: float, spring_j: float, stretch_m: float, in_contact: bool, damping_n_s_per_m: float, dt_s: float
+    ) -> None:
+        """Enter what the device's motion did, with the spring as it was.
+
+        Args:
+            taken_j: energy that the force that was applied took, as seen from the target [J].
+            spring_j: the part of it that the spring's own force took [J].
+            stretch_m: length of the spring now [m].
+            in_contact: whether the port is in force.
+            damping_n_s_per_m: damping of the law now, entered with a completed cycle [N s/m].
+            dt_s: time since the last sample [s].
+        """
+        stored_j = self._gain * self._weight * _stored_j(self._stiffness, stretch_m, self._limit_n)
+        self.ledger.update(-1.0, taken_j, spring_j, stored_j, in_contact, damping_n_s_per_m, dt_s)
+
+    def change(self, stiffness_n_per_m: float, stretch_m: float, gain: float, weight: float, limit_n: float) -> None:
+        """Enter what has become of the spring: that is the client's work, but what a release lets go is lost.
+
+        Args:
+            stiffness_n_per_m: now [N/m].
+            stretch_m: its length now [m].
+            gain: how much of the force a release has left, 0 to 1.
+            weight: how much of it the port's own ramp lets through, 0 to 1.
+            limit_n: largest force of the spring [N].
+        """
+        ledger = self.ledger
+        stored_j = gain * weight * _stored_j(stiffness_n_per_m, stretch_m, limit_n)
+        held_j = ledger.stored_j
+        if gain < self._gain:
+            lost_j = held_j * (1.0 - gain / self._gain)
+            ledger.dissipated_j += lost_j
+            held_j -= lost_j
+        self.moved_j += stored_j - held_j
+        ledger.stored_j = stored_j
+        self._stiffness = stiffness_n_per_m
+        self._limit_n = limit_n
+        self._gain = gain
+        self._weight = weight
+
+    def let_go(self) -> None:
+        """Have nothing stored any more; what was is lost."""
+        self.ledger.dissipated_j += self.ledger.stored_j
+        self.ledger.stored_j = 0.0
+        self._gain = self._weight = 0.0
+
+
+def _stored_j(stiffness_n_per_m: float, stretch_m: float, limit_n: float) -> float:
+    """Energy in the spring [J]: k s^2 / 2, and force times length where a limit flattens it."""
+    spring_n = stiffness_n_per_m * stretch_m
+    if spring_n <= limit_n:
+        return 0.5 * spring_n * stretch_m
+    return limit_n * (stretch_m - 0.5 * limit_n / stiffness_n_per_m)

@@ -1,0 +1,413 @@
+"""A port that pulls on the device by itself, a coupling or a force, and its axes, each under a law of its own.
+
+Both stand in one module, since each calls the other: the tick of walls finds the axes among its contacts, the first of
+them hands its calls to the port, and the port asks the laws of all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import sqrt
+
+from hapticd.config.remote import PortLimits
+from hapticd.law import LawSnapshot
+from hapticd.tick.contact import Contact, RunningLaw
+from hapticd.tick.guard import start_blend
+from hapticd.tick.motion import Motion
+from hapticd.tick.remote.books import PortBooks
+from hapticd.tick.remote.port import Port, PortState
+from hapticd.tick.remote.update import Update
+from hapticd.tick.space.channel import LEAST_M, Channel
+
+OUTSIDE_S = 0.5
+"""How long a law that keeps time outside is asked after its port was let go [s]."""
+
+STRICTLY = 1.0 - 1e-15
+"""So that no rounding puts a force above its limit."""
+
+_IDLE, _HELD = PortState.IDLE, PortState.HELD
+
+
+class OnePort(Port):
+    """A coupling or a force under one law an axis.
+
+        F = w min(1, most / |f|) f      f what the laws ask for, w the ramp by which it is let go and taken up
+
+    The books of all axes are one ledger; energy counts as seen from the followed target, and `work_j` is the rest.
+
+    Args:
+        limits: what it may do.
+        motion: where the device is.
+        make_law: a fresh law, one an axis.
+        resolution_m: smallest step of the device's position [m].
+        period_s: nominal time between ticks [s].
+        ramp_s: duration of its ramps [s].
+
+    Attributes:
+        channels: one an axis; the first one leads.
+        books: of all axes together.
+        weight: how much of its force is let through, 0 let go to 1.
+        scale: of what the laws asked for in this tick, how much is left by ramp and limit.
+        most_n: largest force now; it moves to that of `limits` by a ramp [N].
+        stiffness_n_per_m: in force now [N/m].
+        leaving: the scene has it no more.
+    """
+
+    __slots__ = (
+        "_due",
+        "_from_m",
+        "_gain",
+        "_most_change_n",
+        "_outside_s",
+        "_period_s",
+        "asleep",
+        "books",
+        "channels",
+        "leaving",
+        "most_n",
+        "motion",
+        "ramp_s",
+        "scale",
+        "stiffness_n_per_m",
+        "weight",
+    )
+
+    def __init__(
+        self,
+        limits: PortLimits,
+        motion: Motion,
+        make_law: Callable[[], RunningLaw],
+        resolution_m: float,
+        period_s: float,
+        ramp_s: float,
+    ) -> None:
+        axes = len(motion.position_m)
+        super().__init__(limits, axes)
+        self.motion = motion
+        self.books = PortBooks()
+        self.channels = [PortAxis(self, axis, make_law(), resolution_m) for axis in range(axes)]
+        self.ramp_s = ramp_s
+        self.most_n = limits.max_force_n
+        self.stiffness_n_per_m = limits.stiffness_n_per_m
+        self.weight = self.scale = 0.0
+        self.asleep = True
+        self.leaving = False
+        self._period_s = period_s
+        self._due = False
+        self._outside_s = self._most_change_n = 0.0
+        self._from_m = [0.0] * axes  # where the device was
+
+    def take(self, update: Update) -> None:
+        """Take what the client has said; called between ticks."""
+        if self.leaving:
+            return
+        super().take(update)
+        if self.asleep and self.state is _HELD:
+            self.asleep = False
+            for channel in self.channels:
+                channel.wake(True)
+
+    def stand(self) -> None:
+        """Be without force and without a client, where the device is now."""
+        self.forget()
+        self._sleep()
+
+    def leave(self) -> None:
+        """Be gone: what is left of the force fades out."""
+        self.leaving = True
+        if self.state is _HELD:
+            self._become(PortState.RELEASED)
+
+    def set_ramp(self, ramp_s: float) -> None:
+        """Let go and come in within this time from now on [s]."""
+        self.ramp_s = ramp_s
+
+    def change(self, limits: PortLimits) -> None:
+        """Go on under other limits; those of force move there by a ramp."""
+        self.limits = limits
+        self._most_change_n = limits.max_force_n - self.most_n
+
+    def observe(self, dt_s: float) -> None:
+        """See a new sample.
+
+        Args:
+            dt_s: time since the last one, more than 0 [s].
+        """
+        if self.asleep:
+            return
+        self._due = True
+        position_m = self.motion.position_m
+        if self.state is not _HELD and self.weight == 0.0:
+            self._see_outside(dt_s)
+            return
+        if not self.channels[0].in_contact:
+            self._begin()
+            self._from_m[:] = position_m
+        self._see(dt_s)
+        self._from_m[:] = position_m
+
+    def act(self, periods: float) -> None:
+        """Ask the laws for their forces.
+
+        Args:
+            periods: time since the last tick, in periods of the loop.
+
+        Raises:
+            BaseException: whatever a law raises.
+        """
+        if self.asleep:
+            return
+        if self._due:  # once a tick, also where a law fails and all are asked again
+            self._due = False
+            self._go_on(periods * self._period_s)
+        for channel in self.channels:
+            channel.ask(periods)
+        self._limit()
+
+    def hold(self, periods: float) -> None:
+        """Stay with what the laws asked for last, at a tick without a new sample; ramps go on.
+
+        Args:
+            periods: time since the last tick, in periods of the loop.
+        """
+        if self.asleep:
+            return
+        self._go_on(periods * self._period_s)
+        for channel in self.channels:
+            channel.ask_again(periods)
+        self._limit()
+
+    def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
+        """Enter the tick into the books and remember what is applied from now on.
+
+        Args:
+            share: how much of the force the guard let through, 0 to 1.
+            gain: how much of that a release has left, 0 to 1.
+            limit_n: the guard's limit for one contact [N].
+            dt_s: time since the last sample; 0: this is the same once more, and the books wait for the next [s].
+        """
+        if self.asleep:
+            return
+        channels = self.channels
+        limit_n = min(limit_n, self.most_n)
+        if dt_s > 0.0:
+            self._enter(gain, limit_n, dt_s)
+        spring_squared = 0.0
+        for channel in channels:
+            spring_squared += channel.wall.spring_n * channel.wall.spring_n
+        held = gain * self.weight
+        if spring_squared > limit_n * limit_n:
+            held *= limit_n / sqrt(spring_squared)
+        for axis, channel in enumerate(channels):
+            channel.apply_scaled(share, self.scale)
+            channel.held_n = held * channel.wall.spring_n
+            self.force_n[axis] = channel.applied_n
+        if self.weight == 0.0 and self.state is not _HELD and self._is_quiet():
+            self._sleep()
+
+    @property
+    def work_j(self) -> float:
+        """What the client's motion, changes and forces have put in, less what they took [J]."""
+        return self.books.moved_j
+
+    def _begin(self) -> None:
+        """Come into force where the device is."""
+        raise NotImplementedError
+
+    def _see(self, dt_s: float) -> None:
+        """Show the laws a new sample."""
+        raise NotImplementedError
+
+    def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
+        """Enter a tick into the books: first the motion, then what has become of the port."""
+        x_squared = taken_j = spring_j = 0.0
+        for channel in self.channels:
+            taken_j -= channel.applied_n * channel.way_m
+            spring_j -= channel.held_n * channel.way_m
+            x_squared += channel.x_of_law_m * channel.x_of_law_m
+        stretch_m = sqrt(x_squared)
+        damping = max([channel.damping_n_s_per_m for channel in self.channels])
+        self.books.enter(taken_j, spring_j, stretch_m, self.channels[0].in_contact, damping, dt_s)
+        self.books.change(self.stiffness_n_per_m, stretch_m, gain, self.weight, limit_n)
+
+    def _go_on(self, passed_s: float) -> None:
+        """Count time: of the client's silence, of the ramps, of the force that was held."""
+        for axis, newton in enumerate(self.force_n):
+            self.impulse_n_s[axis] += newton * passed_s
+        self.pass_time(passed_s)
+        step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
+        if self.state is _HELD:
+            self.weight = min(1.0, self.weight + step)
+        elif self.weight > 0.0:
+            self.weight = self.weight - step if self.weight > step else 0.0
+        goal_n = self.limits.max_force_n
+        if self.most_n != goal_n:
+            self.most_n = towards(self.most_n, goal_n, self._most_change_n * step)
+
+    def _limit(self) -> None:
+        """Bring what the laws ask for under ramp and limit."""
+        channels = self.channels
+        squared = 0.0
+        for channel in channels:
+            squared += channel.force_n * channel.force_n
+        scale = self.weight
+        if squared > self.most_n * self.most_n:
+            scale *= STRICTLY * self.most_n / sqrt(squared)
+        self.scale = scale
+        for channel in channels:
+            channel.force_n *= scale
+
+    def _see_outside(self, dt_s: float) -> None:
+        """See a sample while nothing is in force; laws that keep time are asked on for a while."""
+        self._outside_s = self._outside_s + dt_s if not self.channels[0].in_contact else 0.0
+        for channel in self.channels:
+            channel.see(0.0, LEAST_M, 0.0, 0.0, dt_s, 0.0, 0.0)
+
+    def _is_quiet(self) -> bool:
+        first = self.channels[0]
+        return not first.in_contact and (first.law.rests or self._outside_s > OUTSIDE_S)
+
+    def _sleep(self) -> None:
+        """Do nothing until a client speaks."""
+        self.asleep = True
+        self.weight = self.scale = self._outside_s = 0.0
+        self._due = False
+        self.books.let_go()
+        for axis, channel in enumerate(self.channels):
+            channel.rest()
+            channel.wake(False)
+            self.force_n[axis] = 0.0
+
+
+class Line:
+    """What stands for the wall of an axis.
+
+    Attributes:
+        outward: 1.0; 0.0 while the port sleeps, so that the tick sees the device nowhere but at 0.
+        axis: of the device.
+        position_m: 0: the port knows where its target is [m].
+        spring_n: the spring's part of the last force [N].
+    """
+
+    __slots__ = ("axis", "outward", "position_m", "spring_n")
+
+    def __init__(self, axis: int) -> None:
+        self.axis = axis
+        self.outward = 0.0
+        self.position_m = 0.0
+        self.spring_n = 0.0
+
+
+class PortAxis(Channel):
+    """One axis of a port. The first one leads: its calls go to the port, and those of the others do nothing.
+
+    Args:
+        port: it.
+        axis: of the device.
+        law: the law of this axis.
+        resolution_m: smallest step of the device's position [m].
+
+    Attributes:
+        asked_n: what its law asks for, blended, before the port's own ramp and limit [N].
+        own_n: the part of what is applied that is not the law's [N].
+    """
+
+    __slots__ = ("_leads", "_port", "asked_n", "own_n")
+
+    def __init__(self, port: OnePort, axis: int, law: RunningLaw, resolution_m: float) -> None:
+        super().__init__(law, resolution_m, port.books.ledger)
+        self.wall = Line(axis)  # type: ignore[assignment]  # stands for a wall, see there
+        self.awake = False
+        self.asked_n = self.own_n = 0.0
+        self._port = port
+        self._leads = axis == 0
+
+    def start(self, position_m: float) -> None:
+        """Be at a position, at rest and without force; what a client has said before does not count."""
+        del position_m
+        if self._leads:
+            self._port.stand()
+
+    def wake(self, awake: bool) -> None:
+        """Take part in the ticks, or not."""
+        self.awake = awake
+        self.wall.outward = 1.0 if awake else 0.0
+
+    def observe(self, x_m: float, velocity_m_per_s: float, dt_s: float) -> None:
+        """See a new sample; the port looks for itself where the device is."""
+        del x_m, velocity_m_per_s
+        if self._leads:
+            self._port.observe(dt_s)
+
+    def act(self, periods: float) -> None:
+        """Ask the laws for their forces.
+
+        Raises:
+            BaseException: whatever a law raises.
+        """
+        if self._leads:
+            self._port.act(periods)
+
+    def hold(self, periods: float) -> None:
+        """Stay with what the laws asked for last; ramps go on."""
+        if self._leads:
+            self._port.hold(periods)
+
+    def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
+        """Enter the tick into the books and remember what is applied from now on."""
+        if self._leads:
+            self._port.settle(share, gain, limit_n, dt_s)
+
+    def blend(self, ticks: int, gain: float, limit_n: float) -> None:
+        """Start the next force where the applied one is now, and go over to what the law asks for."""
+        self.blending = False
+        if self.in_contact:
+            gain *= self._port.weight
+            limit_n = min(limit_n, self._port.most_n)
+            from_n = self.applied_n / gain if gain > 0.0 else 0.0
+            start_blend(self, min(max(from_n, -limit_n), limit_n), -1.0, limit_n, ticks)
+
+    def take_law(self, law: RunningLaw, velocity_m_per_s: float, dt_s: float) -> None:
+        """Go on with another law, already started; the caller blends. A port that sleeps does so on."""
+        awake = self.awake
+        super().take_law(law, velocity_m_per_s, dt_s)
+        self.awake = awake
+
+    def ask(self, periods: float) -> None:
+        """Ask the law of this axis.
+
+        Raises:
+            BaseException: whatever it raises.
+        """
+        Contact.act(self, periods)
+        self.asked_n = self.force_n
+
+    def ask_again(self, periods: float) -> None:
+        """Have what it asked for last once more; a blend goes on."""
+        self.force_n = self.requested_n
+        Contact.hold(self, periods)
+        self.asked_n = self.force_n
+
+    def apply_scaled(self, share: float, scale: float) -> None:
+        """Remember what is applied from now on.
+
+        Args:
+            share: how much of the force the guard let through, 0 to 1.
+            scale: how much of what was asked for the port let through, 0 to 1.
+        """
+        contact_n = self._contact_n
+        if self.blending:
+            contact_n += self.asked_n - self.requested_n  # so that what is left is the law's own part
+        tick = self.tick
+        tick.applied_n = self.applied_n = share * self.force_n
+        tick.applied_contact_n = self._applied_contact_n = self.own_n = share * scale * contact_n
+
+    def snapshot(self, velocity_m_per_s: float = 0.0) -> LawSnapshot:
+        """What a law that takes over now starts from: where and how fast it is as seen from the target."""
+        del velocity_m_per_s
+        return super().snapshot()
+
+
+def towards(now: float, goal: float, change: float) -> float:
+    """A value after a step of its ramp to another one; never past it."""
+    return min(goal, now + change) if change > 0.0 else max(goal, now + change)

@@ -1,0 +1,131 @@
+"""What a client drives: who it is, how old its last word is, and what telemetry tells of it."""
+
+from __future__ import annotations
+
+import enum
+
+from hapticd.config.remote import PortLimits
+from hapticd.tick.remote.update import RELEASED, Update
+
+QUIET_S = 1.0
+"""A port that is let go and taken up again and again is told of once in this time [s]."""
+
+
+class PortState(enum.IntEnum):
+    """How a port stands with its client."""
+
+    IDLE = 0  # no client has said anything yet
+    HELD = 1  # in force
+    STALE = 2  # the client's word is too old, or the same for too long: let go
+    RELEASED = 3  # the client has let go
+
+
+_HELD, _STALE, _RELEASED = PortState.HELD, PortState.STALE, PortState.RELEASED
+
+
+class Port:
+    """One thing that a client drives.
+
+    Args:
+        limits: what it may do.
+        axes: of the device.
+
+    Attributes:
+        name: who it is, through a reload too.
+        kind: "object", "coupling" or "force".
+        limits: in force now.
+        state: how it stands with its client.
+        seq: the client's own number of the message that is in force; -1: none is.
+        age_s: how long ago the last one was taken [s].
+        force_n: force on the device that was applied last, one element an axis [N].
+        impulse_n_s: the sum of force times how long it was applied, since the port exists [N s].
+        target_m: where the followed target is; of a force 0 [m].
+        news: what has become of it since it was last asked; the loop takes and clears it.
+    """
+
+    __slots__ = (
+        "_said_s",
+        "_told",
+        "age_s",
+        "force_n",
+        "impulse_n_s",
+        "kind",
+        "limits",
+        "name",
+        "news",
+        "seq",
+        "state",
+        "target_m",
+    )
+
+    def __init__(self, limits: PortLimits, axes: int) -> None:
+        self.limits = limits
+        self.name = limits.name
+        self.kind = limits.kind
+        self.state = PortState.IDLE
+        self.seq = -1
+        self.age_s = 0.0
+        self.force_n = [0.0] * axes
+        self.impulse_n_s = [0.0] * axes
+        self.target_m = [0.0] * axes
+        self.news: PortState | None = None
+        self._said_s = QUIET_S  # since it was last told that it is let go
+        self._told = False
+
+    @property
+    def work_j(self) -> float:
+        """What the client's motion, changes and forces have put in, less what they took [J]."""
+        raise NotImplementedError
+
+    def take(self, update: Update) -> None:
+        """Take what the client has said; called between ticks, keeps nothing of the update itself.
+
+        Args:
+            update: of this port; numbers beyond the port's limits count as the limit.
+        """
+        self.age_s = 0.0
+        if update.said & RELEASED:
+            if self.state is _HELD:
+                self._become(_RELEASED)
+            return
+        if self._hear(update):
+            self.seq = update.seq
+            if self.state is not _HELD:
+                self._become(_HELD)
+
+    def forget(self) -> None:
+        """Know nothing of a client until it says something anew."""
+        self.state = PortState.IDLE
+        self.seq = -1
+
+    def pass_time(self, passed_s: float) -> None:
+        """Grow older, and let go what is too old.
+
+        Args:
+            passed_s: time since the last tick on this computer's clock [s].
+        """
+        self.age_s += passed_s
+        self._said_s += passed_s
+        if self.state is _HELD and (self.age_s > self.limits.hold_s or self._hangs(passed_s)):
+            self._become(_STALE)
+
+    def _hear(self, update: Update) -> bool:
+        """Take in what this kind of port goes by; False when there is nothing of it yet."""
+        raise NotImplementedError
+
+    def _hangs(self, passed_s: float) -> bool:
+        """Whether the client is to be believed no more though it speaks."""
+        del passed_s
+        return False
+
+    def _become(self, state: PortState) -> None:
+        if state is not _HELD:
+            self.seq = -1
+        if state is _STALE and self._said_s >= QUIET_S:
+            self.news = state
+            self._said_s = 0.0
+            self._told = True
+        elif state is _HELD and self._told:
+            self.news = state
+            self._told = False
+        self.state = state

@@ -1,0 +1,96 @@
+"""A raw force from a client, under limits and under the law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import sqrt
+
+from hapticd.config.remote import PortLimits
+from hapticd.tick.contact import RunningLaw
+from hapticd.tick.motion import Motion
+from hapticd.tick.remote.one_port import OnePort
+from hapticd.tick.remote.update import FORCE, Update
+from hapticd.tick.space.channel import LEAST_M
+
+BLEND_S = 0.005
+"""In which a force goes from nothing to the largest one that the port allows, or back [s]."""
+
+LET_GO_S = 0.05
+"""In which a force whose client is silent is gone at the latest [s]: held, it would push the hand along."""
+
+
+class StreamedForce(OnePort):
+    """A force, ready for the tick. Its law sees a port without a spring, on which the client does all the work.
+
+    Args:
+        limits: what it may do.
+        motion: where the device is.
+        make_law: a fresh law, one an axis.
+        resolution_m: smallest step of the device's position [m].
+        period_s: nominal time between ticks [s].
+        ramp_s: duration of its ramps [s].
+    """
+
+    __slots__ = ("_goal_n", "_now_n", "_same_s")
+
+    def __init__(
+        self,
+        limits: PortLimits,
+        motion: Motion,
+        make_law: Callable[[], RunningLaw],
+        resolution_m: float,
+        period_s: float,
+        ramp_s: float,
+    ) -> None:
+        super().__init__(limits, motion, make_law, resolution_m, period_s, min(ramp_s, LET_GO_S))
+        self._goal_n = [0.0] * len(self.channels)
+        self._now_n = [0.0] * len(self.channels)
+        self._same_s = 0.0
+
+    def set_ramp(self, ramp_s: float) -> None:
+        """Let go and come in within this time, and never more than `LET_GO_S`, from now on [s]."""
+        super().set_ramp(min(ramp_s, LET_GO_S))
+
+    def forget(self) -> None:
+        """Know nothing of a client until it says something anew."""
+        super().forget()
+        self._same_s = 0.0
+
+    def _hear(self, update: Update) -> bool:
+        if not update.said & FORCE:
+            return False
+        most = self.limits.max_force_n
+        goal_n = [min(max(newton, -most), most) for newton in update.force_n[: len(self._goal_n)]]
+        length = sqrt(sum([newton * newton for newton in goal_n]))
+        if length > most:
+            goal_n = [newton * (most / length) for newton in goal_n]
+        if goal_n != self._goal_n or not any(goal_n):
+            self._same_s = 0.0
+        self._goal_n = goal_n
+        return not self._stands_too_long()
+
+    def _hangs(self, passed_s: float) -> bool:
+        self._same_s += passed_s
+        return self._stands_too_long()
+
+    def _stands_too_long(self) -> bool:
+        return 0.0 < self.limits.unchanged_s < self._same_s and any(self._goal_n)
+
+    def _begin(self) -> None:
+        self._now_n[:] = [0.0] * len(self._now_n)
+
+    def _see(self, dt_s: float) -> None:
+        motion = self.motion
+        step_n = self.limits.max_force_n * dt_s / BLEND_S
+        way_n = [goal - now for goal, now in zip(self._goal_n, self._now_n, strict=True)]
+        length_n = sqrt(sum([newton * newton for newton in way_n]))
+        share = step_n / length_n if length_n > step_n else 1.0
+        for axis, channel in enumerate(self.channels):
+            self._now_n[axis] += share * way_n[axis]
+            moved_m = motion.position_m[axis] - self._from_m[axis]
+            channel.see(1.0, -LEAST_M, moved_m, motion.velocity_m_per_s[axis], dt_s, 0.0, self._now_n[axis])
+
+    def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
+        """The client's own part of the force is its work, and the law's is lost."""
+        super()._enter(gain, limit_n, dt_s)
+        self.books.give(sum([channel.own_n * channel.way_m for channel in self.channels]))

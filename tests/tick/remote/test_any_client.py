@@ -1,0 +1,90 @@
+"""Whatever clients say, and whenever: the force is bounded, makes no step, and the books balance."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hapticd.tick.remote.follower import HASTE_PER_S
+from hapticd.tick.remote.streamed_force import BLEND_S
+from tests.tick.remote.rig import COUPLING, FORCE_PORT, MOST_N, PERIOD_S, RAMP_S, Rig, apart, length
+
+K, B, FASTEST = 2000.0, 5.0, 1.0
+ANY = st.floats(-1e308, 1e308) | st.sampled_from([0.0, -0.0, 1e-308, 5e-324, 1e308, -1e308])
+NEAR = st.floats(-0.05, 0.05)
+VECTOR = st.lists(ANY | NEAR, min_size=3, max_size=3)
+
+
+@st.composite
+def said(draw: st.DrawFn) -> dict[str, Any]:
+    """One message, of any fields: the wire lets no NaN in, and nothing here has any other bound."""
+    fields: dict[str, Any] = {}
+    for name in ("position_m", "velocity_m_per_s", "angular_velocity_rad_per_s", "force_n"):
+        if draw(st.booleans()):
+            fields[name] = draw(VECTOR)
+    for name in ("stiffness_n_per_m", "damping_n_s_per_m"):
+        if draw(st.booleans()):
+            fields[name] = draw(ANY)
+    if draw(st.integers(0, 9)) == 0:
+        fields["released"] = True
+    return fields
+
+
+MESSAGES = st.lists(
+    st.tuples(st.integers(0, 10) | st.integers(90, 170), st.sampled_from(["tool", "field"]), said()),
+    min_size=1,
+    max_size=12,
+)
+
+
+@settings(max_examples=15, deadline=None)
+@given(messages=MESSAGES, law=st.sampled_from(["none", "tdpa", "energy-cycle", "ring-damping"]), shake=st.booleans())
+def test_each_port_stays_within_its_limit_and_the_books_balance(
+    messages: list[tuple[int, str, dict[str, Any]]], law: str, shake: bool
+) -> None:
+    rig = Rig(COUPLING + FORCE_PORT, law=law, axes="xyz")
+    n = 0
+    for wait, name, fields in messages:
+        rig.say(name, **fields)
+        for _ in range(wait + 1):
+            n += 1
+            rig.go([3e-3 * math.sin(0.05 * n), 2e-3 * math.cos(0.11 * n), 0.0] if shake else None)
+            for port, most_n in (("tool", MOST_N), ("field", 3.0)):
+                assert length(rig[port].force_n) <= most_n
+                assert all(map(math.isfinite, (*rig[port].target_m, *rig[port].impulse_n_s, rig[port].work_j)))
+    assert rig.tick.fault == 0
+    assert rig.unbalanced_j() < 1e-9 * max(1.0, abs(rig.energy_j))
+
+
+@settings(max_examples=15, deadline=None)
+@given(messages=MESSAGES)
+def test_on_a_device_at_rest_no_force_steps(messages: list[tuple[int, str, dict[str, Any]]]) -> None:
+    """Without a law: what clients do changes a force by its ramps, the target's motion and the blend of a force."""
+    rig = Rig(COUPLING + FORCE_PORT, axes="xyz")
+    ramp = PERIOD_S / RAMP_S
+    most_n = {
+        # a ramp of the whole, one of stiffness and damping, and the motion of the target
+        "tool": (2.0 * MOST_N + B * FASTEST) * ramp + (K + HASTE_PER_S * B) * FASTEST * PERIOD_S,
+        "field": 3.0 * (ramp + PERIOD_S / BLEND_S),
+    }
+    for wait, name, fields in messages:
+        rig.say(name, **fields)
+        for _ in range(wait + 1):
+            before = {port: list(rig[port].force_n) for port in most_n}
+            rig.go()
+            for port, step_n in most_n.items():
+                assert apart(rig[port].force_n, before[port]) <= step_n * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("law", ["none", "damper", "tdpa", "energy-cycle", "ring-damping", "energy-bounding"])
+def test_every_law_bears_a_target_on_the_device(law: str) -> None:
+    """Length 0, in contact: a law that divides by its depth does not find 0 there."""
+    rig = Rig(COUPLING, law=law, axes="xyz")
+    for n in range(300):
+        rig.say("tool", position_m=[0.0, 0.0, 0.0])
+        rig.go([0.0, 0.0, 1e-3 if n % 60 > 30 else 0.0])
+    assert rig.tick.fault == 0
