@@ -129,9 +129,9 @@ def balance(device: SimulationOptions, walls: Sequence[WallConfig]) -> Balance:
         for later in wall.changes:
             stiffness = stiffness if later.stiffness_n_per_m is None else later.stiffness_n_per_m
         planes.append((outward * (wall.position_m - walls[0].position_m), stiffness))
-    total, moment = device.hand.stiffness_n_per_m, 0.0
-    for change in device.changes:
-        total = total if change.hand_stiffness_n_per_m is None else change.hand_stiffness_n_per_m
+    reaches = hand_share(device)
+    force_n *= reaches
+    total, moment = reaches * _last(device, "hand_stiffness_n_per_m", device.hand.stiffness_n_per_m), 0.0
     x_m = math.nan
     for plane_m, stiffness in sorted(planes, reverse=True):
         if total > 0.0 and (moment - force_n) / total > plane_m:
@@ -156,7 +156,22 @@ def pressing_n(device: SimulationOptions) -> float:
 
 def coulomb_n(device: SimulationOptions) -> float:
     """Coulomb friction at the end [N]."""
-    friction = device.coulomb_n
+    return _last(device, "coulomb_n", device.coulomb_n)
+
+
+def hand_share(device: SimulationOptions) -> float:
+    """What of the force and of the spring of the hand is left at rest where the sensor is.
+
+    Less than 1 where the hand's spring and that of a flexible device are in series: the hand's yields at the handle.
+    """
+    if device.flexible is None or device.flexible.sensor == "handle":
+        return 1.0
+    spring, _ = device.flexible.spring(_last(device, "mass_kg", device.mass_kg))
+    return spring / (spring + _last(device, "hand_stiffness_n_per_m", device.hand.stiffness_n_per_m))
+
+
+def _last(device: SimulationOptions, key: str, value: float) -> float:
+    """A value of `Change` at the end."""
     for change in device.changes:
-        friction = friction if change.coulomb_n is None else change.coulomb_n
-    return friction
+        value = change.values().get(key, value)
+    return value

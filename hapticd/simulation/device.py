@@ -36,7 +36,6 @@ class SimulatedDevice:
         switches = terms(options, coupled)
         self._move = specialise(move, switches)
         self._sense = specialise(sense, switches)
-        self._buffers = Buffers(delay_line(options), *recorded_points(options))
         self.state = PlantState()
         for name, value in start_state(options).items():
             setattr(self.state, name, value)
@@ -47,6 +46,7 @@ class SimulatedDevice:
                 setattr(params, name, value)
             self._coming.append((tick, params))
         self._coming.reverse()
+        self._buffers = Buffers(delay_line(options, period_s), *recorded_points(options))
         self._params = self._coming.pop()[1]
         self._next_change = self._coming[-1][0] if self._coming else math.inf
         self._sense(self.state, self._params)

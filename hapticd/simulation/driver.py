@@ -182,9 +182,24 @@ def _safe_damping(options: SimulationOptions, period_s: float) -> float:
     A damper on the difference of two samples is stable below 2, 0.83, 0.54, 0.40 m / T with 0, 1, 2, 3 samples of
     delay; 0.75 / (1 + delay) stays under half of each, and 0.41 m / T under half of the second, should one sample of
     delay be there undeclared. A slow actuator counts as delay. The hand is left out: it may let go.
+
+    Of a flexible device the motor alone counts, which a stiff damper holds while the handle swings; and it bears no
+    more than half of what its own swing loses where the damper may drive that swing: with the sensor at the handle,
+    which then moves against the motor, or where the damper lags an eighth of a swing.
     """
-    delay = float(options.force_delay_samples)
+    delay = options.force_delay_samples + options.force_delay_s / period_s
     if options.bandwidth_hz > 0.0:
         delay += 1.0 / (2.0 * math.pi * options.bandwidth_hz * period_s)
     mass_kg = min([options.mass_kg, *(change.mass_kg for change in options.changes if change.mass_kg is not None)])
-    return min(0.41, 0.75 / (1.0 + delay)) * mass_kg / period_s
+    safe = min(0.41, 0.75 / (1.0 + delay)) * mass_kg / period_s
+    flexible = options.flexible
+    if flexible is None:
+        return safe
+    share = flexible.handle_share
+    safe *= 1.0 - share
+    turns = flexible.frequency_hz * period_s * (1.0 + delay)
+    if flexible.sensor == "motor" and turns <= 0.125:
+        return safe
+    # Per speed of the motor its own swing loses c / r^2, and a damper on the handle's speed gives it B (1 - r) / r.
+    _, damper = flexible.spring(mass_kg)
+    return min(safe, 0.5 * damper / (share * (share if flexible.sensor == "motor" else 1.0 - share)))

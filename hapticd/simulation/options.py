@@ -166,6 +166,25 @@ class Change(DriverOptions):
         }
 
 
+class Flexible(DriverOptions):
+    """flexible: the handle hangs on the motor by a spring and a damper, and so the device swings by itself."""
+
+    frequency_hz: float = Field(
+        ge=1e-3, le=1e6, description="at which it swings with both ends free, without a hand [Hz]"
+    )
+    handle_share: float = Field(ge=1e-3, le=0.999, description="share of mass_kg at the handle, behind the spring")
+    damping_ratio: float = Field(0.02, ge=0.0, le=10.0, description="of that swing")
+    sensor: Literal["motor", "handle"] = Field(
+        "motor", description="the end whose position is measured; that is where the wall is"
+    )
+
+    def spring(self, mass_kg: float) -> tuple[float, float]:
+        """Stiffness [N/m] and damping [N s/m] between the ends of a device of this mass."""
+        reduced_kg = mass_kg * self.handle_share * (1.0 - self.handle_share)
+        turns = 2.0 * math.pi * self.frequency_hz
+        return turns * turns * reduced_kg, 2.0 * self.damping_ratio * turns * reduced_kg
+
+
 class Accuracy(DriverOptions):
     """accuracy: largest errors against the full model, exactly stepped, over the first seconds of the configuration."""
 
@@ -210,6 +229,10 @@ class SimulationOptions(DriverOptions):
     force_delay_samples: int = Field(
         0, ge=0, le=MAX_DELAY_SAMPLES, description="periods between a write and its force on the device"
     )
+    force_delay_s: float = Field(
+        0.0, ge=0.0, le=1e3, description="time besides these from the sample to the force, any part of a period [s]"
+    )
+    flexible: Flexible | None = Field(None, description="a spring between motor and handle; unset: a rigid device")
     initial_position_m: float = Field(0.0, ge=-1e3, le=1e3, description="start relative to the wall, > 0 outside [m]")
     initial_velocity_m_per_s: float = Field(
         0.0, ge=-1e3, le=1e3, description="velocity at the start, > 0 outward [m/s]"
@@ -262,6 +285,20 @@ class SimulationOptions(DriverOptions):
             raise ValueError("substeps must be 1 with the exact integrator, which needs no more")
         if self.accuracy is not None and (self.integrator != "exact" or self.clock != "ticks"):
             raise ValueError('accuracy chooses the integrator itself, and needs clock = "ticks"')
+        return self
+
+    @model_validator(mode="after")
+    def _exact_terms_fit(self) -> SimulationOptions:
+        asked = [name for name in ("force_delay_s", "flexible") if getattr(self, name)]
+        for name in asked:
+            if self.axes > 1:
+                raise ValueError(f"{name} needs axes = 1")
+            if self.integrator != "exact" or self.accuracy is not None:
+                raise ValueError(f'{name} is stepped exactly: needs integrator = "exact" and no accuracy')
+            if self.bandwidth_hz:
+                raise ValueError(f"{name} needs bandwidth_hz = 0: the lag of an actuator is a mean over whole periods")
+        if self.flexible is not None and (self.coulomb_n or any(change.coulomb_n for change in self.changes)):
+            raise ValueError("flexible needs coulomb_n = 0: two masses that bend do not stop together")
         return self
 
     @model_validator(mode="after")

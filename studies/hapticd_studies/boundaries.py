@@ -16,7 +16,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from hapticd.simulation.options import Flexible
 from hapticd.simulation.plant import flow
+from hapticd_studies.sampled import Sampled, flexible_plant, late_plant
 
 DAMPER_PEAK = (0.6862915010152397, 0.1444693492260521, 0.0624304893523135, 0.0347816935996251)
 """Largest stiffness [m/T^2] that any wall damping makes stable on a bare mass, with 0, 1, 2, 3 samples of delay."""
@@ -36,6 +38,9 @@ class Loop:
         resolution_m: step of the position sensor [m].
         hand_n_per_m: spring of the hand [N/m].
         hand_n_s_per_m: damping of the hand [N s/m].
+        late_s: time besides the samples of delay [s].
+        flexible: a spring between motor and handle.
+        hand_kg: what of the mass is the hand's, which then moves with the handle [kg].
     """
 
     mass_kg: float
@@ -47,6 +52,14 @@ class Loop:
     resolution_m: float = 0.0
     hand_n_per_m: float = 0.0
     hand_n_s_per_m: float = 0.0
+    late_s: float = 0.0
+    flexible: Flexible | None = None
+    hand_kg: float = 0.0
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the force comes on a sample and nothing bends: closed forms hold."""
+        return self.late_s == 0.0 and self.flexible is None
 
     @property
     def damping_n_s_per_m(self) -> float:
@@ -74,7 +87,7 @@ def stable_limit(loop: Loop) -> float:
 
     Closed forms where there are some: a spring alone with d = 0 or 1, and the digital damper on a bare mass.
     """
-    if loop.hand_n_per_m == 0.0:
+    if loop.hand_n_per_m == 0.0 and loop.rigid:
         if loop.wall_damping_n_s_per_m == 0.0 and loop.delay_samples in (0, 1):
             return spring_limit(loop.mass_kg, loop.damping_n_s_per_m, loop.period_s, loop.delay_samples)
         if loop.damping_n_s_per_m == 0.0 and loop.delay_samples == 0 and loop.wall_damping_n_s_per_m > 0.0:
@@ -113,16 +126,17 @@ def damper_peak(mass_kg: float, period_s: float, delay_samples: int = 0) -> floa
 def passive_limit(loop: Loop) -> float:
     """Colgate and Schenkel 1997: passive for b > KT/2 + |B|, and with a late spring alone for b > K(T/2 + dT) [N/m]."""
     damping = abs(loop.wall_damping_n_s_per_m)
-    if loop.delay_samples and damping > 0.0:
+    if loop.flexible is not None or ((loop.delay_samples or loop.late_s) and damping > 0.0):
         return math.nan
-    return max(0.0, (loop.viscous_n_s_per_m - damping) / ((0.5 + loop.delay_samples) * loop.period_s))
+    late_s = (0.5 + loop.delay_samples) * loop.period_s + loop.late_s
+    return max(0.0, (loop.viscous_n_s_per_m - damping) / late_s)
 
 
 def quantised_passive_limit(loop: Loop) -> float:
     """Abbott and Okamura 2005: with a quantised position a spring is passive for K <= min(2b/T, 2 f_c/step) [N/m]."""
     if not (loop.coulomb_n > 0.0 and loop.resolution_m > 0.0):
         return math.nan
-    if loop.wall_damping_n_s_per_m != 0.0 or loop.delay_samples:
+    if loop.wall_damping_n_s_per_m != 0.0 or loop.delay_samples or not loop.rigid:
         return math.nan
     return min(2.0 * max(0.0, loop.viscous_n_s_per_m) / loop.period_s, 2.0 * loop.coulomb_n / loop.resolution_m)
 
@@ -140,6 +154,8 @@ def linear_limit(loop: Loop) -> float:
 
     On the circle z = exp(j theta) the loop closes for K = -z^d D/N - B (1 - 1/z)/T, of which the real ones count.
     """
+    if not loop.rigid:
+        return _sampled(loop).limit(loop.wall_damping_n_s_per_m, loop.period_s)
     numerator, denominator = _open_loop(loop)
     damping, period_s, delay = loop.wall_damping_n_s_per_m, loop.period_s, loop.delay_samples
 
@@ -162,6 +178,8 @@ def linear_limit(loop: Loop) -> float:
 
 def is_stable(loop: Loop, stiffness_n_per_m: float) -> bool:
     """Whether every root of the linear loop lies inside the unit circle."""
+    if not loop.rigid:
+        return _sampled(loop).grows(stiffness_n_per_m, loop.wall_damping_n_s_per_m, loop.period_s) < 1.0
     numerator, denominator = _open_loop(loop)
     delay = loop.delay_samples
     damping = loop.wall_damping_n_s_per_m / loop.period_s
@@ -190,6 +208,25 @@ def _open_loop(loop: Loop) -> tuple[tuple[float, float], tuple[float, float]]:
         -(keeps + slope),
         keeps * slope + stiffness * swing * swing,
     )
+
+
+@lru_cache(maxsize=4096)
+def _sampled(loop: Loop) -> Sampled:
+    """The plant of a loop whose force comes between samples, or that bends."""
+    whole = math.floor(loop.late_s / loop.period_s + 1e-9)
+    late_s = max(0.0, loop.late_s - whole * loop.period_s)
+    delay = loop.delay_samples + whole
+    if loop.flexible is None:
+        rates = loop.damping_n_s_per_m / loop.mass_kg, loop.hand_n_per_m / loop.mass_kg
+        return late_plant(loop.mass_kg, *rates, loop.period_s, late_s, delay)
+    values = {
+        "mass_kg": loop.mass_kg - loop.hand_kg,
+        "viscous_n_s_per_m": loop.viscous_n_s_per_m,
+        "hand_mass_kg": loop.hand_kg,
+        "hand_damping_n_s_per_m": loop.hand_n_s_per_m,
+        "hand_stiffness_n_per_m": loop.hand_n_per_m,
+    }
+    return flexible_plant(loop.flexible, values, loop.period_s, late_s, delay)
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:

@@ -17,7 +17,7 @@ from hapticd.offline.operations import count_operations, operations_by_code
 from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.device import SimulatedDevice
 from hapticd.simulation.options import SimulationOptions
-from hapticd.simulation.plant import hold, move, sense, step, stepped, terms
+from hapticd.simulation.plant import bend, hold, move, sense, step, stepped, terms
 
 
 def device(**keys: Any) -> SimulatedDevice:
@@ -75,7 +75,8 @@ def test_every_term_costs_its_own_instructions_and_none_when_it_is_absent() -> N
         key: period(**{key: value}) - bare
         for key, value in {
             "resolution_m": 1e-5, "noise_m": 1e-6, "max_force_n": 5.0, "bandwidth_hz": 100.0,
-            "force_delay_samples": 2, "coulomb_n": 0.1,
+            "force_delay_samples": 2, "coulomb_n": 0.1, "force_delay_s": 4e-4,
+            "flexible": {"frequency_hz": 150.0, "handle_share": 0.3},
         }.items()
     }  # fmt: skip
     assert all(cost > 0 for cost in costs.values()), costs
@@ -100,7 +101,9 @@ def test_the_exact_step_is_the_cheapest_integrator_too() -> None:
 def test_a_plain_device_runs_no_line_of_what_it_has_not() -> None:
     mover = device()
     run = {code.co_name for code in operations_by_code(partial(mover.advance, -1.0))}
-    absent: list[Callable[..., Any]] = [step.slide, step.stand_still, stepped.stepped, stepped.acceleration, hold.flow]
+    absent: list[Callable[..., Any]] = [
+        bend.bend, step.slide, step.stand_still, stepped.stepped, stepped.acceleration, hold.flow
+    ]  # fmt: skip
     assert not run & {function.__name__ for function in absent}
 
 

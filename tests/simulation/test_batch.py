@@ -69,6 +69,28 @@ SCENARIOS: dict[str, tuple[dict[str, Any], WallConfig, dict[str, Any]]] = {
         wall(5000.0),
         {"max_force_n": 4.0, "velocity_samples": 5},
     ),
+    "late-with-friction": (
+        {
+            "model": "hapkit",
+            "force_delay_s": 1.3e-3,
+            "initial_position_m": 0.002,
+            "hand": pressed(-2.0, stiffness_n_per_m=50.0),
+            "changes": [{"at_s": 5.0, "coulomb_n": 0.0}],
+        },
+        wall(4000.0),
+        {"max_force_n": 5.0},
+    ),
+    "flexible-and-late": (
+        {
+            "force_delay_s": 4e-4,
+            "flexible": {"frequency_hz": 130.0, "handle_share": 0.3},
+            "initial_position_m": 0.002,
+            "hand": pressed(-3.0, mass_kg=0.05, damping_n_s_per_m=1.0, stiffness_n_per_m=100.0),
+            "changes": [{"at_s": 5.0, "hand_mass_kg": 0.2}],
+        },
+        wall(9000.0),
+        {"max_force_n": 12.0},
+    ),
 }
 
 

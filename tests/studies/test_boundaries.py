@@ -6,14 +6,18 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from hapticd import plugins
 from hapticd.config.walls import WallConfig
 from hapticd.simulation.batch import Batch, Point
-from hapticd.simulation.options import SimulationOptions
+from hapticd.simulation.device import SimulatedDevice
+from hapticd.simulation.options import Flexible, SimulationOptions
 from hapticd_studies import boundaries
 from hapticd_studies.boundaries import Loop
+
+Array = npt.NDArray[np.float64]
 
 T = 1e-3
 NONE = plugins.law("none")
@@ -177,3 +181,65 @@ def cycle_m(stiffness: float, step_m: float, friction_n: float) -> float:
 def test_without_friction_or_steps_the_quantised_limit_is_silent() -> None:
     assert math.isnan(boundaries.quantised_passive_limit(Loop(0.25, 4.0, T, resolution_m=1e-5)))
     assert math.isnan(boundaries.quantised_passive_limit(Loop(0.25, 4.0, T, coulomb_n=0.1)))
+
+
+@pytest.mark.parametrize(
+    ("late", "limit"),
+    [(0.1, 7353.0), (0.25, 5884.0), (0.5, 4416.0), (0.75, 3535.0), (1.0, 2948.0), (1.5, 2214.0), (2.0, 1773.0)],
+)
+def test_a_force_that_comes_late_by_any_part_of_a_period_has_the_tabled_limits(late: float, limit: float) -> None:
+    loop = Loop(0.25, 4.4, T, late_s=late * T)
+    assert boundaries.stable_limit(loop) == pytest.approx(limit, abs=0.6)
+    assert boundaries.passive_limit(loop) == pytest.approx(4.4 / (0.5 + late) / T)
+    whole = Loop(0.25, 4.4, T, delay_samples=math.floor(late), late_s=(late - math.floor(late)) * T)
+    assert boundaries.stable_limit(whole) == pytest.approx(boundaries.stable_limit(loop), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("delay", "hertz", "ratio", "damping"),
+    [(0, 120, 0.01, 315), (0, 200, 0.03, 251), (0, 400, 0.01, 63), (1, 120, 0.03, 58), (1, 300, 0.03, 131)],
+)
+def test_a_flexible_handle_bites_damping_where_the_table_says(
+    delay: int, hertz: float, ratio: float, damping: int
+) -> None:
+    flexible = Flexible(frequency_hz=hertz, handle_share=0.3, damping_ratio=ratio)
+
+    def stable(wall: float) -> bool:
+        return boundaries.is_stable(Loop(0.25, 4.4, T, wall, delay, flexible=flexible), 12000.0)
+
+    assert stable(damping - 0.5)
+    assert not stable(damping + 1.5)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.3, 1.6])
+@pytest.mark.parametrize("sensor", ["motor", "handle"])
+def test_a_flexible_loop_turns_unstable_where_the_model_itself_does(late: float, sensor: str) -> None:
+    """Eigenvalues of the map that the simulated device shows, one state after the other set to 1."""
+    flexible = {"frequency_hz": 90.0, "handle_share": 0.4, "damping_ratio": 0.02, "sensor": sensor}
+    hand = {"mass_kg": 0.05, "damping_n_s_per_m": 1.0, "stiffness_n_per_m": 200.0}
+    keys = {"model": "paper-simulation", "mass_kg": 0.25, "viscous_n_s_per_m": 3.0, "force_delay_s": late * T}
+    options = SimulationOptions.model_validate({**keys, "flexible": flexible, "hand": hand})
+    loop = Loop(
+        0.3, 3.0, T, hand_n_per_m=200.0, hand_n_s_per_m=1.0, hand_kg=0.05, late_s=late * T, flexible=options.flexible
+    )
+    limit = boundaries.stable_limit(loop)
+    whole = math.floor(late)
+
+    def step(unit: Array, stiffness: float) -> Array:
+        mover = SimulatedDevice(options, T)
+        state = mover.state
+        state.x_m, state.v_m_per_s, state.stretch_m, state.stretch_m_per_s = unit[:4]
+        for at in range(whole):
+            mover._buffers.line[-1 - at] = unit[4 + at]
+        state.before_n = unit[4 + whole]
+        force = -stiffness * unit[0]
+        mover.advance(force)
+        moved = (state.x_m, state.v_m_per_s, state.stretch_m, state.stretch_m_per_s)
+        return np.array([*moved, force, *unit[4 : 4 + whole]])
+
+    def grows(stiffness: float) -> float:
+        columns = np.column_stack([step(unit, stiffness) for unit in np.eye(5 + whole)])
+        return float(np.abs(np.linalg.eigvals(columns)).max())
+
+    assert 500.0 < limit < 30_000.0
+    assert grows(0.999 * limit) < 1.0 < grows(1.001 * limit)

@@ -35,7 +35,7 @@ class Prepared:
         self.ticks = max(1, round(duration_s / period_s))
         self.window = min(self.ticks, max(1, round(window_s / period_s)))
         self.epochs = [fields for _, fields in changes]
-        self.line = delay_line(device)
+        self.line = delay_line(device, period_s)
         self.recorded = recorded_points(device)
         plant = plain(start_state(device))
         specialise(sense, terms(device))(plant, plain(self.epochs[0]))

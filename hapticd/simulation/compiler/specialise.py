@@ -75,13 +75,19 @@ class _Pruner(ast.NodeTransformer):
     def __init__(self, switches: dict[str, bool]) -> None:
         self._switches = switches
 
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        super().generic_visit(node)
+        if isinstance(node, ast.stmt) and getattr(node, "body", None) == []:
+            node.body = [ast.Pass()]  # type: ignore[attr-defined]  # it has just been seen to have one
+        return node
+
     def visit_If(self, node: ast.If) -> Any:
         self.generic_visit(node)
         first, *rest = node.test.values if isinstance(node.test, ast.BoolOp) else [node.test]
         if not (isinstance(first, ast.Name) and first.id in self._switches):
             return node
         if not self._switches[first.id]:
-            return node.orelse or ast.Pass()
+            return node.orelse
         if not rest:
             return node.body
         node.test = rest[0] if len(rest) == 1 else ast.BoolOp(ast.And(), rest)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from hapticd.config.timing import first_tick
 from hapticd.simulation.options import (
+    MAX_DELAY_SAMPLES,
     ChirpForce,
     ConstantForce,
+    Flexible,
     PressAndReleaseForce,
     RampForce,
     RecordedForce,
@@ -16,6 +19,7 @@ from hapticd.simulation.options import (
     SineForce,
     StepForce,
 )
+from hapticd.simulation.plant.flexible import TwoMasses, flexible_fields, rigid_fields
 from hapticd.simulation.plant.hand import (
     PROFILE_CHIRP,
     PROFILE_CONSTANT,
@@ -64,6 +68,10 @@ def start_state(options: SimulationOptions) -> dict[str, float | int]:
         "noise_a": 1 + seed * 69069 % 2147483562,
         "noise_b": 1 + (seed * 1664525 + 1013904223) % 2147483398,
         "pushed_n": 0.0,
+        "before_n": 0.0,
+        "change_n": 0.0,
+        "stretch_m": 0.0,
+        "stretch_m_per_s": 0.0,
     }
 
 
@@ -100,7 +108,9 @@ def terms(options: SimulationOptions, coupled: bool = False) -> dict[str, bool]:
     """Which switches of `step` and `hand` a device needs on, as one by itself or as one of several axes."""
     return {
         "COUPLED": coupled,
-        "DELAY": options.force_delay_samples > 0,
+        "DELAY": options.force_delay_samples > 0 or options.force_delay_s > 0.0,
+        "LATE": options.force_delay_s > 0.0,
+        "FLEXIBLE": options.flexible is not None,
         "SATURATION": options.max_force_n > 0.0 or any(change.max_force_n for change in options.changes),
         "LAG": options.bandwidth_hz > 0.0,
         "SPRING": options.hand.stiffness_n_per_m > 0.0 or any(c.hand_stiffness_n_per_m for c in options.changes),
@@ -116,9 +126,9 @@ def terms(options: SimulationOptions, coupled: bool = False) -> dict[str, bool]:
     }
 
 
-def delay_line(options: SimulationOptions) -> list[float]:
+def delay_line(options: SimulationOptions, period_s: float) -> list[float]:
     """An empty delay line."""
-    return [0.0] * (options.force_delay_samples + 1)
+    return [0.0] * (_delay(options, period_s)[0] + 1)
 
 
 def recorded_points(options: SimulationOptions) -> tuple[list[float], list[float]]:
@@ -127,6 +137,25 @@ def recorded_points(options: SimulationOptions) -> tuple[list[float], list[float
     if not isinstance(force, RecordedForce):
         return [0.0], [0.0]
     return [time_s for time_s, _ in force.points], [newton for _, newton in force.points]
+
+
+def two_masses(flexible: Flexible, values: Mapping[str, float]) -> TwoMasses:
+    """A flexible device and its hand.
+
+    Args:
+        flexible: the spring in it.
+        values: of device and hand, by the names of `Change`.
+    """
+    mass_kg, share = values["mass_kg"], flexible.handle_share
+    return TwoMasses(
+        (1.0 - share) * mass_kg,
+        share * mass_kg + values["hand_mass_kg"],
+        values["viscous_n_s_per_m"],
+        *flexible.spring(mass_kg),
+        values["hand_stiffness_n_per_m"],
+        values["hand_damping_n_s_per_m"],
+        flexible.sensor == "motor",
+    )
 
 
 def _hand_terms(options: SimulationOptions) -> dict[str, bool]:
@@ -176,6 +205,12 @@ def _hand_fields(options: SimulationOptions) -> dict[str, float | int]:
     return fields
 
 
+def _delay(options: SimulationOptions, period_s: float) -> tuple[int, float]:
+    """Whole periods between command and force, and what is left [s]."""
+    whole = math.floor(options.force_delay_s / period_s + 1e-9)
+    return options.force_delay_samples + whole, max(0.0, options.force_delay_s - whole * period_s)
+
+
 def _params(
     options: SimulationOptions, values: dict[str, float], period_s: float, coupled: bool
 ) -> dict[str, float | int]:
@@ -183,7 +218,7 @@ def _params(
     decay_per_s = (values["viscous_n_s_per_m"] + values["hand_damping_n_s_per_m"]) / mass_kg
     spring_n_per_m = values["hand_stiffness_n_per_m"]
     stiffness_per_s2 = spring_n_per_m / mass_kg
-    _refuse_beyond_doubles(values, mass_kg, period_s)
+    _refuse_beyond_doubles(options, values, mass_kg, period_s)
     v_per_v, v_per_a, x_per_a = flow(decay_per_s, stiffness_per_s2, period_s)
     swing_per_s2 = stiffness_per_s2 - 0.25 * decay_per_s * decay_per_s
     half_swing_s = math.pi / math.sqrt(swing_per_s2) if swing_per_s2 > 0.0 else math.inf
@@ -197,6 +232,7 @@ def _params(
         ratio = 2.0 * math.pi * options.bandwidth_hz * period_s
         lag_keep = math.exp(-ratio)
         lag_mean = -math.expm1(-ratio) / ratio
+    delay_samples, late_s = _delay(options, period_s)
     return {
         "period_s": period_s,
         "x_per_v": v_per_a,
@@ -213,20 +249,61 @@ def _params(
         "limit_n": values["max_force_n"] or math.inf,
         "lag_keep": lag_keep,
         "lag_mean": lag_mean,
-        "delay_samples": options.force_delay_samples,
+        "delay_samples": delay_samples,
+        "late_s": late_s,
+        "late_share": late_s / period_s,
         "method": METHODS.index(options.integrator),
         "substeps": options.substeps,
         "substep_s": period_s / options.substeps,
         "resolution_m": options.resolution_m,
         "noise_m": options.noise_m * math.sqrt(3.0),
         **_hand_fields(options),
+        **_bending_fields(options, values, period_s, late_s),
     }
 
 
-def _refuse_beyond_doubles(values: dict[str, float], mass_kg: float, period_s: float) -> None:
+def _bending_fields(
+    options: SimulationOptions, values: dict[str, float], period_s: float, late_s: float
+) -> dict[str, float | int]:
+    """The fields of `PlantParams` that say how the device bends, and what a force within a period does."""
+    if options.flexible is not None:
+        return flexible_fields(two_masses(options.flexible, values), period_s, late_s)
+    if late_s == 0.0 or values["coulomb_n"] > 0.0:  # with friction, `move` goes on in two pieces
+        return rigid_fields()
+    mass_kg = values["mass_kg"] + values["hand_mass_kg"]
+    decay_per_s = (values["viscous_n_s_per_m"] + values["hand_damping_n_s_per_m"]) / mass_kg
+    stiffness_per_s2 = values["hand_stiffness_n_per_m"] / mass_kg
+    _, early_v, early_x = flow(decay_per_s, stiffness_per_s2, late_s)
+    slope, swing, area = flow(decay_per_s, stiffness_per_s2, period_s - late_s)
+    pull = -stiffness_per_s2 * early_x
+    return rigid_fields((early_x + early_v * swing + pull * area) / mass_kg, (early_v * slope + pull * swing) / mass_kg)
+
+
+def _refuse_beyond_doubles(
+    options: SimulationOptions, values: dict[str, float], mass_kg: float, period_s: float
+) -> None:
     """Say which parameter leads to a step that double precision cannot hold."""
     if not 0.0 < period_s <= LONGEST_PERIOD_S:
         raise ValueError(f"period_s = {period_s:g}: must be more than 0 and at most {LONGEST_PERIOD_S:g} s")
+    if options.force_delay_s > MAX_DELAY_SAMPLES * period_s:
+        raise ValueError(
+            f"force_delay_s = {options.force_delay_s:g}: must be at most {MAX_DELAY_SAMPLES} periods, "
+            f"{MAX_DELAY_SAMPLES * period_s:g} s"
+        )
+    if options.flexible is not None:
+        frequency_hz = options.flexible.frequency_hz
+        if frequency_hz * period_s > MOST_TURNS:
+            raise ValueError(
+                f"flexible.frequency_hz = {frequency_hz:g}: must be at most {MOST_TURNS / period_s:g}, "
+                f"{MOST_TURNS:g} swings in a period of {period_s:g} s"
+            )
+        motor_kg = (1.0 - options.flexible.handle_share) * values["mass_kg"]
+        if -values["viscous_n_s_per_m"] / motor_kg * period_s > MOST_GROWTH:
+            raise ValueError(
+                f"viscous_n_s_per_m = {values['viscous_n_s_per_m']:g}: a motor of {motor_kg:g} kg would speed up more "
+                f"than e^{MOST_GROWTH:g}-fold in a period of {period_s:g} s; must be "
+                f"{-MOST_GROWTH * motor_kg / period_s:g} or more"
+            )
     viscous = values["viscous_n_s_per_m"] + values["hand_damping_n_s_per_m"]
     grows = -viscous / mass_kg * period_s
     if grows > MOST_GROWTH:

@@ -8,6 +8,7 @@ friction is one: the instant of standstill is found inside the period, and the d
 from __future__ import annotations
 
 from hapticd.simulation.plant.arithmetic import ROUND
+from hapticd.simulation.plant.bend import bend
 from hapticd.simulation.plant.hand import hand_force
 from hapticd.simulation.plant.hold import flow
 from hapticd.simulation.plant.state import Buffers, PlantParams, PlantState
@@ -15,6 +16,8 @@ from hapticd.simulation.plant.stepped import METHOD_EXACT, stepped
 
 # Terms of the model. All on is the full model; `coefficients.terms` says which ones a device needs.
 DELAY: bool = True
+LATE: bool = True
+FLEXIBLE: bool = True
 SATURATION: bool = True
 LAG: bool = True
 HAND: bool = True
@@ -46,20 +49,36 @@ def move(state: PlantState, params: PlantParams, buffers: Buffers, force_n: floa
         state.lag_n = f + distance_n * params.lag_keep
         f = f + distance_n * params.lag_mean
     state.applied_n = f
+    if LATE:
+        state.change_n = state.before_n - f
+        state.before_n = f
+        state.applied_n = f + state.change_n * params.late_share
+    if FLEXIBLE:
+        motor_n = f
     if HAND:
         f = f + hand_force(state, params, buffers)
     if COUPLED and params.coupled == 1:
         state.pushed_n = f  # several axes go on together: `space.coupled`
     elif STEPPED and params.method != METHOD_EXACT:
         stepped(state, params, f)
+    elif FLEXIBLE and params.flexible == 1:
+        bend(state, params, motor_n, f - motor_n)
     elif FRICTION:
-        slide(state, params, f)
+        if LATE and params.late_s > 0.0 and params.coulomb_n > 0.0:
+            stand_still(state, params, f + state.change_n, params.late_s)
+            stand_still(state, params, f, params.period_s - params.late_s)
+        else:
+            slide(state, params, f)
     else:
         if SPRING:
             f = f - params.spring_n_per_m * state.x_m
         v = state.v_m_per_s
         state.x_m = state.x_m + (v * params.x_per_v + f * params.x_per_f)
         state.v_m_per_s = v * params.v_per_v + f * params.v_per_f
+    if LATE:
+        # Until the newest force acts, the one before does; the equation is linear, so what it has more comes on top.
+        state.x_m = state.x_m + state.change_n * params.x_per_change
+        state.v_m_per_s = state.v_m_per_s + state.change_n * params.v_per_change
     if TIMED:
         state.tick += 1
 
@@ -100,16 +119,15 @@ def slide(state: PlantState, params: PlantParams, force_n: float) -> None:
         push_n = net_n - params.coulomb_n if outward else net_n + params.coulomb_n
         end_v = v * params.v_per_v + push_n * params.v_per_f
         if end_v == 0.0 or (end_v > 0.0) != outward or params.half_swing_s <= params.period_s:
-            stand_still(state, params, force_n)
+            stand_still(state, params, force_n, params.period_s)
             return
         net_n = push_n
     state.x_m = x + (v * params.x_per_v + net_n * params.x_per_f)
     state.v_m_per_s = v * params.v_per_v + net_n * params.v_per_f
 
 
-def stand_still(state: PlantState, params: PlantParams, force_n: float) -> None:
-    """One period of `slide` in which the device comes to rest at least once."""
-    left_s = params.period_s
+def stand_still(state: PlantState, params: PlantParams, force_n: float, left_s: float) -> None:
+    """`slide` over any time, in which the device may come to rest more than once."""
     while left_s > 0.0:
         x = state.x_m
         v = state.v_m_per_s

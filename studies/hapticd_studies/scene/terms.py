@@ -39,6 +39,9 @@ def terms_of(loaded: LoadedConfig) -> list[Term]:
         found.append(
             Term("sub-steps of the integrator", _without_keys(("device", "options"), "integrator", "substeps"))
         )
+    for name, key in (("force delay within a period", "force_delay_s"), ("flexible handle", "flexible")):
+        if getattr(options, key):
+            found.append(Term(name, _without_keys(("device", "options"), key)))
     if options.changes:
         found.append(Term("changes of the device", _without_keys(("device", "options"), "changes")))
     velocity = loaded.config.velocity

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hapticd.law import LawParams
-from hapticd.offline.outcome import Balance, Criterion, Outcome
+from hapticd.offline.outcome import Balance, Criterion, Outcome, hand_share
 from hapticd.simulation.batch import Point
 from hapticd_studies.transparency.devices import Held
 
@@ -28,8 +28,9 @@ class Arrival:
 
     def balance(self, device: Held) -> Balance:
         """Where hand and springs balance."""
-        springs = device.stiffness_n_per_m + device.options.hand.stiffness_n_per_m
-        return Balance(-self.force_n / springs, springs)
+        reaches = hand_share(device.options)
+        springs = device.stiffness_n_per_m + reaches * device.options.hand.stiffness_n_per_m
+        return Balance(-reaches * self.force_n / springs, springs)
 
 
 HARD = Arrival(3.0, 0.002, 0.2)

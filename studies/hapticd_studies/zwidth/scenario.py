@@ -57,6 +57,9 @@ class PressScenario:
             resolution_m=self.device.resolution_m,
             hand_n_per_m=hand.stiffness_n_per_m,
             hand_n_s_per_m=hand.damping_n_s_per_m,
+            late_s=self.device.force_delay_s,
+            flexible=self.device.flexible,
+            hand_kg=hand.mass_kg,
         )
 
 

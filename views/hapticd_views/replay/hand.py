@@ -48,6 +48,7 @@ class HandForce:
                 "initial_position_m": float(self.x_m[0]),
                 "initial_velocity_m_per_s": float(self.v_m_per_s[0]),
                 "coulomb_n": 0.0,
+                "flexible": None,
                 "changes": (),
             }
         )
@@ -56,7 +57,8 @@ class HandForce:
 def identify(x_m: Any, force_n: Any, device: SimulationOptions, period_s: float, bandwidth_hz: float) -> HandForce:
     """The force of the hand that was on a device.
 
-    What the model does not have, such as Coulomb friction or a mass that is another one, is in this force as well.
+    What the model does not have, such as Coulomb friction, a flexible handle or a mass that is another one, is in this
+    force as well.
 
     Args:
         x_m: measured positions on the wall's normal, one a period.
@@ -82,7 +84,7 @@ def identify(x_m: Any, force_n: Any, device: SimulationOptions, period_s: float,
 
 def _applied(force_n: Any, device: SimulationOptions, period_s: float) -> Any:
     """What the actuator made of the commands: delay, saturation, lag."""
-    still = {"hand": Hand(force=ConstantForce(newton=0.0)), "changes": (), "noise_m": 0.0}
+    still = {"hand": Hand(force=ConstantForce(newton=0.0)), "changes": (), "noise_m": 0.0, "flexible": None}
     actuator = SimulatedDevice(device.model_copy(update=still), period_s)
     applied = []
     for command_n in force_n:
