@@ -18,7 +18,7 @@ from hapticd.simulation.plant.coefficients import two_masses
 
 Array = npt.NDArray[np.float64]
 
-_ANGLES = 6000
+_ANGLES = 2500
 _CLOSE = 1e-9  # a root this near to the circle is on it
 
 

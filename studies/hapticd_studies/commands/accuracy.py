@@ -44,7 +44,10 @@ def command(
     loaded = load(config or directory("config") / "wall-12-energy-cycle.toml")
     from hapticd.offline.rehearsal import simulation_options
 
-    simulation_options(loaded)
+    options = simulation_options(loaded)
+    for key in ("force_delay_s", "flexible"):
+        if getattr(options, key):
+            raise ConfigError(f"device.options.{key}: is stepped exactly only; take it out to compare integrators")
     require_folder(output, _FILES)
     from hapticd_studies.accuracy.plot import draw
     from hapticd_studies.accuracy.study import steps, study

@@ -25,6 +25,13 @@ def command(
         str, typer.Option(help="all: every law; or some, as ring-damping,damper:damping_n_s_per_m=20.")
     ] = "all",
     quick: Annotated[bool, typer.Option("--quick", help="14 devices, 6 s, four laws: about 20 s on one core.")] = False,
+    out_of_sample: Annotated[
+        bool,
+        typer.Option(
+            "--out-of-sample",
+            help="Devices that no law was made for: forces any part of a sample late, flexible handles.",
+        ),
+    ] = False,
     replay: Annotated[str | None, typer.Option(help="One device again, SEED:INDEX.")] = None,
     output: Annotated[
         Path | None, typer.Option(help="Folder of the results; `transparency`, and with --replay none, if not given.")
@@ -64,7 +71,7 @@ def command(
     if replay is not None:
         from hapticd_studies.transparency.replay import device_of, figures, write_files
 
-        device = device_of(replay)
+        device = device_of(replay, out_of_sample)
         if output is not None:
             require_folder(output, ())
         console = Console(highlight=False)
@@ -83,10 +90,11 @@ def command(
     require_folder(folder, _FILES)
 
     from hapticd_studies.grid.run import kept, run
+    from hapticd_studies.transparency.devices import OUT_OF_SAMPLE
     from hapticd_studies.transparency.plot import draw
     from hapticd_studies.transparency.report import AT_REST_WORDS, MOVING_WORDS, report
 
-    plan = TransparencyPlan(seed, devices, seconds, chosen, Criterion())
+    plan = TransparencyPlan(seed, devices, seconds, chosen, Criterion(), out_of_sample)
     Console(stderr=True, highlight=False).print(
         f"{devices} devices, {len(chosen)} laws, hands of {seconds:g} s: {plan.ticks / 1e6:.0f} million ticks and the "
         "constant dampers",
@@ -109,6 +117,11 @@ def command(
         ("Hands that move", found.moving(), MOVING_WORDS),
     ):
         console.print(f"\n[bold]{head}[/]", table, words, sep="\n")
-    console.print(f"\nOne again: hapticd study transparency --seconds {seconds:g} --replay {seed}:0", soft_wrap=True)
+    if out_of_sample:
+        console.print("\n[bold]By what they have[/]", found.parts(), f"Out of sample: {OUT_OF_SAMPLE}", sep="\n")
+    asked = " --out-of-sample" if out_of_sample else ""
+    console.print(
+        f"\nOne again: hapticd study transparency{asked} --seconds {seconds:g} --replay {seed}:0", soft_wrap=True
+    )
     console.print(f"{plan.criterion.words()}", soft_wrap=True, markup=False)
     console.print(f"{folder}: {', '.join(_FILES)}", soft_wrap=True, markup=False)

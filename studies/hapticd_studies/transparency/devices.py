@@ -5,6 +5,7 @@ Each is drawn from its seed and its index alone, as those of the robustness stud
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from random import Random
@@ -31,6 +32,14 @@ DRAWN = (
     "most 0.8 of the damper peak; force limit 12 N"
 )
 
+OUT_OF_SAMPLE = (
+    "as those of the same seed, but without actuator corner; one in three with a force that comes 0-2 samples late, "
+    "any part of one, in place of whole samples; one in three flexible: 60-500 Hz with both ends free, 10-50 % of the "
+    "mass behind the spring, damping ratio 0.5-5 %, one in four with its sensor at the handle; one in three both"
+)
+PARTS = ("late", "flexible", "both")
+"""What devices out of sample have that the others have not, in turn."""
+
 
 @dataclass(frozen=True)
 class Held:
@@ -43,6 +52,7 @@ class Held:
         wall: the wall.
         rate_hz: loop rate [Hz].
         own_n_per_m: the stiffest wall that device and hand hold by themselves, without lag [N/m].
+        part: one of `PARTS` where it is out of sample.
     """
 
     seed: int
@@ -52,6 +62,7 @@ class Held:
     wall: WallConfig
     rate_hz: float
     own_n_per_m: float
+    part: str = ""
 
     @property
     def name(self) -> str:
@@ -81,7 +92,7 @@ class Held:
     @property
     def late(self) -> bool:
         """Whether its force comes one sample late or more."""
-        return self.options.force_delay_samples > 0
+        return self.options.force_delay_samples > 0 or self.options.force_delay_s >= self.period_s
 
     @property
     def own_share(self) -> float:
@@ -149,6 +160,7 @@ class Held:
             "noise_m": options.noise_m,
             "bandwidth_hz": options.bandwidth_hz,
             "force_delay_samples": options.force_delay_samples,
+            **self._bending(),
             "hand_mass_kg": hand.mass_kg,
             "hand_damping_n_s_per_m": hand.damping_n_s_per_m,
             "hand_stiffness_n_per_m": hand.stiffness_n_per_m,
@@ -156,6 +168,19 @@ class Held:
             "stiffness_n_per_m": self.stiffness_n_per_m,
             "share_of_own_limit": self.own_share,
             "leak_n_s_per_m": self.leak_n_s_per_m,
+        }
+
+    def _bending(self) -> dict[str, Any]:
+        if not self.part:
+            return {}
+        flexible = self.options.flexible
+        return {
+            "part": self.part,
+            "force_delay_s": self.options.force_delay_s,
+            "flexible_hz": flexible.frequency_hz if flexible else math.nan,
+            "handle_share": flexible.handle_share if flexible else math.nan,
+            "damping_ratio": flexible.damping_ratio if flexible else math.nan,
+            "sensor": flexible.sensor if flexible else "",
         }
 
 
@@ -193,6 +218,41 @@ def draw(seed: int, index: int) -> Held:
     wall = WallConfig(stiffness_n_per_m=_digits(wanted))
     kind = KINDS[index % len(KINDS)]
     return Held(seed, index, kind, SimulationOptions.model_validate(options), wall, rate_hz, own)
+
+
+@lru_cache(maxsize=65536)
+def draw_out_of_sample(seed: int, index: int) -> Held:
+    """The device of `draw` with what no law was made for, from a generator of its own; its wall is drawn anew."""
+    before = draw(seed, index)
+    source = Random(f"hapticd transparency out of sample {seed}:{index}")
+    part = PARTS[index % len(PARTS)]
+    late, share = source.uniform(0.0, 2.0), source.uniform(0.1, 0.5)
+    hertz, ratio = _logarithmic(source, 60.0, 500.0), _logarithmic(source, 0.005, 0.05)
+    sensor = "handle" if source.random() < 0.25 else "motor"
+    more: dict[str, Any] = {"bandwidth_hz": 0.0}
+    if part != "flexible":
+        more |= {"force_delay_samples": 0, "force_delay_s": _digits(late * before.period_s)}
+    if part != "late":
+        flexible = {"frequency_hz": hertz, "handle_share": _digits(share), "damping_ratio": ratio, "sensor": sensor}
+        more["flexible"] = flexible
+    options = SimulationOptions.model_validate({**before.options.model_dump(exclude_unset=True), **more})
+    hand = options.hand
+    own = stable_limit(
+        Loop(
+            before.mass_kg,
+            options.viscous_n_s_per_m,
+            before.period_s,
+            delay_samples=options.force_delay_samples,
+            hand_n_s_per_m=hand.damping_n_s_per_m,
+            late_s=options.force_delay_s,
+            flexible=options.flexible,
+            hand_kg=hand.mass_kg,
+        )
+    )
+    delay = options.force_delay_samples + math.ceil(options.force_delay_s / before.period_s)
+    most = HARDEST * damper_peak(before.mass_kg, before.period_s, delay)
+    wall = WallConfig(stiffness_n_per_m=_digits(min(most, own * _logarithmic(source, 0.2, 5.0))))
+    return Held(seed, index, before.kind, options, wall, before.rate_hz, own, part)
 
 
 def _logarithmic(source: Random, low: float, high: float) -> float:

@@ -16,7 +16,7 @@ from hapticd.offline.outcome import Criterion
 from hapticd.simulation.batch import TRACE_COLUMNS
 from hapticd_studies.grid.output import as_csv, write
 from hapticd_studies.law_spec import LawSpec
-from hapticd_studies.transparency.devices import Held, draw
+from hapticd_studies.transparency.devices import Held, draw, draw_out_of_sample
 from hapticd_studies.transparency.plot import draw_one
 from hapticd_studies.transparency.references import COLUMNS, references
 from hapticd_studies.transparency.report import figures_of
@@ -25,8 +25,12 @@ from hapticd_studies.transparency.runs import columns_of, moving_runs, rows, tim
 _PICTURED_S = 3.0
 
 
-def device_of(text: str) -> Held:
+def device_of(text: str, out_of_sample: bool = False) -> Held:
     """The device of `SEED:INDEX`.
+
+    Args:
+        text: which one.
+        out_of_sample: of those that have what no law was made for.
 
     Raises:
         ConfigError: it is none.
@@ -34,7 +38,8 @@ def device_of(text: str) -> Held:
     found = re.fullmatch(r"(\d{1,18}):(\d{1,9})", text)
     if found is None:
         raise ConfigError(f"--replay {text}: must be SEED:INDEX, as 1:57")
-    return draw(int(found[1]), int(found[2]))
+    one = draw_out_of_sample if out_of_sample else draw
+    return one(int(found[1]), int(found[2]))
 
 
 def figures(device: Held, laws: Sequence[LawSpec], duration_s: float, criterion: Criterion) -> Table:

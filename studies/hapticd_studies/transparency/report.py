@@ -16,7 +16,7 @@ from hapticd.offline.outcome import Outcome
 from hapticd.version import __version__
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.transparency import references
-from hapticd_studies.transparency.devices import DRAWN, Held
+from hapticd_studies.transparency.devices import DRAWN, OUT_OF_SAMPLE, PARTS, Held
 from hapticd_studies.transparency.hands import KINDS
 from hapticd_studies.transparency.runs import COLUMNS
 from hapticd_studies.transparency.summary import LawSummary, summary
@@ -39,7 +39,8 @@ MOVING_WORDS = (
 """What the heads of the tables mean."""
 
 GROUPS = ("all", "no delay", "late", "below own limit")
-"""Of the devices that some constant damper holds; `below own limit`: the wall needs no law at all."""
+"""Of the devices that some constant damper holds; `below own limit`: the wall needs no law at all. Out of sample, each
+of `PARTS` is a group too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +88,14 @@ class TransparencyReport:
             )
         return shown
 
+    def parts(self) -> Table:
+        """For the terminal: what is held out of sample, by what a device has that no law was made for."""
+        shown = _table(*(f"held, {part}" for part in PARTS), *(f"unfelt, {part}" for part in PARTS))
+        for _, *each in self._lines(*PARTS):
+            values = [one.held for one in each] + [one.unfelt for one in each]
+            shown.add_row(_label(each[0].law), *(_number(100.0 * value) for value in values))
+        return shown
+
     def json(self) -> bytes:
         """For programs; the figures of each device are in the CSV file."""
         return as_json(
@@ -98,7 +107,7 @@ class TransparencyReport:
                 "held_by_some_damper": int(np.isfinite(self.dampers[:, 0]).sum()),
                 "hands": list(KINDS),
                 "duration_s": self.plan.duration_s,
-                "drawn": DRAWN,
+                "drawn": OUT_OF_SAMPLE if self.plan.out_of_sample else DRAWN,
                 "criterion": self.plan.criterion.declared(),
                 "groups": {name: [one.declared() for one in found] for name, found in self.summaries.items()},
             }
@@ -130,6 +139,8 @@ def report(plan: TransparencyPlan, tables: Sequence[Array]) -> TransparencyRepor
     late = np.array([device.late for device in devices])
     easy = np.array([device.own_share < 1.0 for device in devices])
     chosen = dict(zip(GROUPS, (holdable, holdable & ~late, holdable & late, holdable & easy), strict=True))
+    if plan.out_of_sample:
+        chosen |= {part: holdable & np.array([device.part == part for device in devices]) for part in PARTS}
     undamped = next((table for law, table in zip(plan.laws, tables[1:], strict=True) if law.label == "none"), None)
     summaries = {
         name: [

@@ -15,7 +15,7 @@ from hapticd.simulation.compiler.compile import compiled_step
 from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
 from hapticd_studies.law_spec import LawSpec, parse_laws
-from hapticd_studies.transparency.devices import Held, draw
+from hapticd_studies.transparency.devices import Held, draw, draw_out_of_sample
 from hapticd_studies.transparency.references import references
 from hapticd_studies.transparency.runs import rows, seconds_of
 
@@ -36,6 +36,7 @@ class TransparencyPlan:
         duration_s: of each moving hand [s].
         laws: those that are compared.
         criterion: what still and in place mean.
+        out_of_sample: the devices have what no law was made for.
     """
 
     seed: int
@@ -43,11 +44,13 @@ class TransparencyPlan:
     duration_s: float
     laws: Sequence[LawSpec]
     criterion: Criterion
+    out_of_sample: bool = False
 
     @property
     def devices(self) -> list[Held]:
         """The devices, in order."""
-        return [draw(self.seed, index) for index in range(self.count)]
+        one = draw_out_of_sample if self.out_of_sample else draw
+        return [one(self.seed, index) for index in range(self.count)]
 
     @property
     def ticks(self) -> float:
@@ -59,6 +62,7 @@ class TransparencyPlan:
         sizes = block_sizes(self.count, _MOST_DEVICES)
         spec = {
             "seed": self.seed,
+            "out_of_sample": self.out_of_sample,
             "duration_s": self.duration_s,
             "laws": [{"label": law.label, "name": law.name, "values": dict(law.values)} for law in self.laws],
             "criterion": asdict(self.criterion),
@@ -90,7 +94,8 @@ def every_law() -> list[LawSpec]:
 def _block(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
     sizes = spec["sizes"]
     law, block = divmod(block, len(sizes))
-    devices = [draw(spec["seed"], index) for index in block_cells(sizes, block)]
+    one = draw_out_of_sample if spec["out_of_sample"] else draw
+    devices = [one(spec["seed"], index) for index in block_cells(sizes, block)]
     criterion = Criterion(**spec["criterion"])
     if law == 0:
         return references(devices, criterion, threads)
