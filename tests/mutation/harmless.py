@@ -42,7 +42,18 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/tick/velocity.py: push: if last_s > 10.0:  [Gt 0 is GtE]",
         "hapticd/tick/velocity.py: _History.start: self.time_s[0] = 0.0  [0.0 is 1.0]",
     ),
+    "the act of the same tick has read it and reset it": (
+        "hapticd/tick/space/solid_contact.py: SolidContact._face: def _face  [without self.turned = False]",
+    ),
+    "it is placed once more, where it has just been placed": (
+        "hapticd/tick/space/solid_contact.py: SolidContact._stand: def _stand  [without self._away = False]",
+    ),
+    "whatever is small enough to be no length will do": (
+        "hapticd/tick/space/channel.py: slip_along: if -LEAST_M < x_m < LEAST_M:  [Lt 1 is LtE]",
+        "hapticd/tick/space/channel.py: : LEAST_M = 1e-15  [1e-15 is 2e-15]",
+    ),
     "it is set before it is read": (
+        "hapticd/tick/space/channel.py: Channel.__init__: def __init__  [without self.dz = 1.0]",
         "hapticd/tick/contact.py: Contact.__init__: def __init__  [without self.x_m = 0.0]",
         "hapticd/tick/tick.py: ControlTick.__init__: def __init__  [without self._excused = False]",
         "hapticd/tick/energy.py: EnergyLedger.__init__: self.window_minimum_j = 0.0  [0.0 is 1.0]",

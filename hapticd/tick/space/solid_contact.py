@@ -379,8 +379,6 @@ class SolidContact:
 
     def _restore(self, limit_n: float) -> None:
         """Book what a change of the solid does to its spring."""
-        stored_j = 0.0
-        if self.depth_m > 0.0 and self.solid.stiffness_n_per_m > 0.0:
-            stored_j = self.solid.stored_j(self._stretch_m(), limit_n)
+        stored_j = self.solid.stored_j(self._stretch_m(), limit_n) if self.depth_m > 0.0 else 0.0
         self.moved_j += stored_j - self.ledger.stored_j
         self.ledger.stored_j = stored_j

@@ -1,0 +1,91 @@
+"""What the law of each direction of an object is shown, holds and forgets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hapticd.tick.space.solid_contact import OUTSIDE_S
+from tests.tick.rig import law, running
+from tests.tick.space.rig import PERIOD_S, Point, Rig, apart, ball
+
+ROUGH: dict[str, Any] = {"static_friction": 0.8, "dynamic_friction": 0.6}
+ABOVE: Point = (0.0, 0.0, 0.031)
+
+
+def pressed(scene: str, name: str = "none") -> Rig:
+    return Rig(scene, name).start(ABOVE).to((0.0, 0.0, 0.0292), 60)
+
+
+def test_a_device_that_says_the_same_once_more_is_pushed_as_before() -> None:
+    """Walls and objects alike hold their force; nothing is entered into the books until it has news."""
+    wall = '[[scene.walls]]\naxis = "x"\nposition_m = 0.001\nstiffness_n_per_m = 1000.0\n'
+    rig = pressed(wall + ball(**ROUGH))
+    force, energy_j = rig.force, rig.totals.ledger.energy_j
+    assert force[0] > 0.5
+    assert force[2] > 3.0
+    for _ in range(5):
+        rig.tick.advance(rig.sample, PERIOD_S)
+        assert tuple(rig.tick.force_n) == force
+    assert rig.totals.ledger.energy_j == energy_j
+    rig.go((0.0, 0.0, 0.0291))
+    assert rig.force[2] == pytest.approx(4.5, rel=1e-3)
+
+
+def test_the_forces_of_all_directions_add_up_to_the_spring_between_device_and_proxy() -> None:
+    """Also where the device sticks on a curved surface, on which the way to the proxy is not along the normal."""
+    rig = pressed(ball(**ROUGH)).to((0.002, 0.001, 0.0291), 20)
+    proxy = rig.tick.solids[0].solid.proxy
+    normal = (proxy.normal_x, proxy.normal_y, proxy.normal_z)
+    stretch = (proxy.stretch_x, proxy.stretch_y, proxy.stretch_z)
+    assert apart(stretch, (0.0, 0.0, 0.0)) > 1e-4
+    spring = [5000.0 * (proxy.depth_m * n + s) for n, s in zip(normal, stretch, strict=True)]
+    assert apart(rig.force, spring) < 1e-9
+    assert apart(rig.force, (0.0, 0.0, 0.0)) > 3.0
+
+
+def test_a_law_is_shown_what_of_its_force_and_of_the_contacts_was_applied() -> None:
+    shown: list[tuple[float, float, float]] = []
+
+    def step(_state: Any, _params: Any, tick: Any) -> float:
+        shown.append((tick.contact_n, tick.applied_n, tick.applied_contact_n))
+        return tick.contact_n + 0.25
+
+    rig = Rig(ball(), "none").start(ABOVE)
+    for _ in rig.tick.switch(make_law=running(law(step))):
+        pass
+    rig.to((0.0, 0.0, 0.0292), 60)
+    shown.clear()
+    rig.go((0.0, 0.0, 0.0291), (0.0, 0.0, 0.029))
+    (first_n, *_), (_, applied_n, applied_contact_n) = shown
+    assert first_n == pytest.approx(4.5)
+    assert (applied_n, applied_contact_n) == pytest.approx((4.75, 4.5))
+
+
+def test_an_object_that_changed_goes_on_from_nothing_since_its_shade_holds_its_force() -> None:
+    rig = pressed(ball(**ROUGH)).to((0.001, 0.0005, 0.0291), 20)
+    assert any(channel.held_n for channel in rig.tick.solids[0].channels)
+    rig.switch(ball(stiffness=4000.0, **ROUGH))
+    for channel in rig.tick.solids[0].channels:
+        assert (channel.applied_n, channel.held_n, channel.way_m) == (0.0, 0.0, 0.0)
+        assert (channel.tick.applied_n, channel.tick.applied_contact_n) == (0.0, 0.0)
+    assert [channel.snapshot().x_m for channel in rig.tick.solids[0].channels[1:]] == [0.0, 0.0]
+
+
+def test_a_law_that_keeps_time_is_asked_for_half_a_second_after_the_touch_and_no_longer() -> None:
+    asked = 0
+
+    def step(_state: Any, _params: Any, tick: Any) -> float:
+        nonlocal asked
+        asked += 1
+        return float(tick.contact_n)
+
+    rig = Rig(ball(), "none").start(ABOVE)
+    for _ in rig.tick.switch(make_law=running(law(step))):
+        pass
+    rig.to((0.0, 0.0, 0.0292), 60).to((0.0, 0.0, 0.0301), 10)
+    asked = 0
+    for count in range(1000):
+        rig.go((0.0, 0.0, 0.0301 + 1e-6 * (count % 2)))
+    assert asked == pytest.approx(OUTSIDE_S / PERIOD_S, abs=5)
