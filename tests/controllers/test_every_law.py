@@ -25,6 +25,7 @@ from hapticd.law import (
     check_law,
     fresh_state,
     plain_object,
+    rests_outside,
     scalar_params,
 )
 from hapticd.testing.law_contract import LawContract
@@ -98,6 +99,12 @@ class TestEveryLaw(LawContract):
     @pytest.fixture(params=plugins.names(plugins.CONTROLLERS))
     def module(self, request: pytest.FixtureRequest) -> ModuleType:
         return plugins.law(request.param)
+
+
+@each_law
+def test_only_laws_that_keep_time_are_asked_outside_a_wall(law: ModuleType) -> None:
+    """A ring dies away there, and a coupling swings; for the others asking would cost a tick for nothing."""
+    assert rests_outside(law) == (law not in (ring_damping, virtual_coupling))
 
 
 @each_law

@@ -34,7 +34,7 @@ class Room:
 
 def _law(name: str) -> Room:
     own = () if name == "none" else (f"tests/controllers/test_{name}.py",)
-    select = f"test_{name} or {name.title().replace('_', '')}"
+    select = f"{name} or {name.replace('_', '-')}"
     return Room((f"controllers/hapticd_controllers/{name}.py",), (*own, "tests/controllers/test_every_law.py"), select)
 
 
