@@ -108,6 +108,39 @@ def test_only_laws_that_keep_time_are_asked_outside_a_wall(law: ModuleType) -> N
 
 
 @each_law
+def test_a_start_leaves_nothing_of_what_came_before_it(law: ModuleType) -> None:
+    """A law is started again on the state it has, where the surface has turned away under it."""
+    snapshot = LawSnapshot(-1e-3, 0.02, 3.0, 2e-3, 40.0)
+    for given_params in readings(law):
+        params = plain_object("Params", scalar_params(given_params))
+        fresh, used = fresh_state(law), fresh_state(law)
+        for name in type(used).__slots__:
+            setattr(used, name, type(getattr(used, name))(7))
+        for state in (fresh, used):
+            law.start(state, params, snapshot)
+        assert bits(used) == bits(fresh)
+
+
+@pytest.mark.parametrize(
+    "law", [law for law in LAWS if law is not damper], ids=lambda law: law.__name__.rpartition(".")[2]
+)
+def test_outside_a_wall_no_law_asks_for_a_force(law: ModuleType) -> None:
+    """But for the bare damper, which brakes wherever it is asked: there the loop sends nothing."""
+    state, params = fresh_state(law), plain_object("Params", scalar_params(law.Params()))
+    law.start(state, params, LawSnapshot(-1e-3, 0.02, 3.0, 2e-3, 40.0))
+    law.step(state, params, LawTick(x_m=-1e-3, in_contact=True, contact_n=8.0, spring_n=8.0))
+    for _ in range(3):
+        assert law.step(state, params, LawTick(x_m=1e-3, moved_m=2e-3, velocity_m_per_s=2.0, applied_n=8.0)) == 0.0
+
+
+@pytest.mark.parametrize("law", [damper, set_position], ids=lambda law: law.__name__.rpartition(".")[2])
+def test_a_damping_that_is_set_is_published_from_the_start(law: ModuleType) -> None:
+    state = fresh_state(law)
+    law.start(state, law.Params(damping_n_s_per_m=33.0), LawSnapshot())
+    assert state.damping_n_s_per_m == 33.0
+
+
+@each_law
 def test_a_choice_is_the_constant_of_its_name(law: ModuleType) -> None:
     """Compiled code knows no strings: `rule = "signed"` arrives as the index of the choice, RULE_SIGNED."""
     for name, each in choices(law).items():

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hapticd.law import LawSnapshot
+from hapticd.law import LawSnapshot, LawTick, fresh_state
 from hapticd_controllers import damper, set_position
 from hapticd_controllers.set_position import Params
 
@@ -73,3 +73,14 @@ def test_a_debt_is_dissipated_before_the_wall_stands_where_it_should() -> None:
     assert rig.state.set_position_m < 0.0
     rig.run(2.0)
     assert rig.state.set_position_m == 0.0
+
+
+def test_what_a_jump_does_not_cost_is_left_for_the_next_one() -> None:
+    """E(n) = E(n-1) + B dx^2 / dt - k x^2 / 2 once the spring stands on the surface, less what it held before."""
+    state, params = fresh_state(set_position), Params(damping_n_s_per_m=50.0)
+    set_position.start(state, params, LawSnapshot())
+    for x_m, moved_m, left_j in ((-1e-3, -2e-3, 0.2 - 0.005), (-2e-3, -1e-3, 0.195 + 0.05 + 0.02 - 0.02)):
+        force_n = -1e4 * x_m
+        tick = LawTick(x_m=x_m, moved_m=moved_m, in_contact=True, contact_n=force_n, spring_n=force_n)
+        assert set_position.step(state, params, tick) == pytest.approx(force_n)
+        assert state.energy_j == pytest.approx(left_j)

@@ -33,6 +33,7 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "self._frozen_s  [GtE 0 is Gt]",
     ),
     "no clock and no sum of measured places comes to it exactly": (
+        "drivers/hapticd_drivers/rig/conversation.py: Conversation.await_state: if left_ns <= 0:  [LtE 0 is Lt]",
         "hapticd/supervisor/recovery.py: HotplugWatch.news: if now_s < self._due_s:  [Lt 0 is LtE]",
         "hapticd/supervisor/recovery.py: Recovery.begin: if now_s - self._found_s > STEADY_S:  [Gt 0 is GtE]",
         "drivers/hapticd_drivers/rig/motion.py: find_stop: if abs(end.position_m - first.position_m) > max(AGREE_M, "
@@ -44,6 +45,11 @@ EQUAL: dict[str, tuple[str, ...]] = {
     ),
     "the act of the same tick has read it and reset it": (
         "hapticd/tick/space/solid_contact.py: SolidContact._face: def _face  [without self.turned = False]",
+    ),
+    "it is said anew before a law is asked": (
+        "hapticd/tick/space/channel.py: Channel.see: tick.moved_m = self._moved_m = self.way_m = moved_m  "
+        "[without self._moved_m]",
+        "hapticd/tick/space/channel.py: Channel.rest: def rest  [without self.in_contact = False]",
     ),
     "it is placed once more, where it has just been placed": (
         "hapticd/tick/space/solid_contact.py: SolidContact._stand: def _stand  [without self._away = False]",

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from hapticd.device import MOST_METRICS
-from hapticd.errors import DeviceDisconnectedError, DeviceTimeoutError
+from hapticd.errors import DeviceDisconnectedError, DeviceProtocolError, DeviceTimeoutError
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.conversation import Conversation
 from hapticd_drivers.rig.metrics import (
@@ -43,8 +43,10 @@ class Scripted:
     def __init__(self) -> None:
         self.heard: deque[list[bytes]] = deque()
         self.waits_s: list[float] = []
+        self.sent: list[bytes] = []
 
-    def send(self, message: bytes) -> None: ...
+    def send(self, message: bytes) -> None:
+        self.sent.append(message)
 
     def receive(self) -> list[bytes]:
         return self.heard.popleft() if self.heard else []
@@ -181,6 +183,11 @@ class Answering(Scripted):
             self.heard.append([with_flags(number, sequence, self.flags.popleft())])
 
 
+def refused(reason: int, of: int) -> bytes:
+    body = _REFUSED.pack(messages.VERSION, messages.REFUSED, 0, 0, 0, reason, of)
+    return body + messages.checksum(body).to_bytes(2, "little")
+
+
 def with_flags(sequence: int, echo: int, flags: int) -> bytes:
     body = _STATE.pack(messages.VERSION, messages.STATE, sequence, echo, 0, flags, 0, 0, 7, 0)
     return body + messages.checksum(body).to_bytes(2, "little")
@@ -231,8 +238,7 @@ def test_the_rigs_own_counts_are_added_from_the_second_pong_on(talk: Talk) -> No
 
 def test_a_rig_that_was_switched_off_and_on_counts_anew(talk: Talk) -> None:
     assert talk.hears(500, 501) == [500, 501]
-    body = _REFUSED.pack(messages.VERSION, messages.REFUSED, 0, 0, 0, messages.NO_HELLO, messages.POLL)
-    talk.link.heard.append([body + messages.checksum(body).to_bytes(2, "little")])
+    talk.link.heard.append([refused(messages.NO_HELLO, messages.POLL)])
     with pytest.raises(DeviceDisconnectedError, match="has restarted, or was switched off and on"):
         talk.conversation.newest()
     assert talk.hears(1, 2) == [1, 2]
@@ -274,3 +280,16 @@ def test_questions_without_an_answer_are_counted_until_one_comes(talk: Talk) -> 
     assert talk.conversation.unanswered == 2
     talk.hears(4)
     assert talk.conversation.unanswered == 0
+
+
+def test_a_rig_of_another_version_is_told_at_once_and_what_else_it_refuses_is_not_the_answer(talk: Talk) -> None:
+    talk.link.heard += [[refused(messages.NO_HELLO, messages.POLL)], [refused(messages.WRONG_VERSION, messages.HELLO)]]
+    with pytest.raises(DeviceProtocolError, match="it speaks another version of the protocol"):
+        talk.conversation.greet()
+    assert not talk.link.heard
+
+
+def test_a_rig_is_asked_for_its_counts_without_a_delay(talk: Talk) -> None:
+    number = talk.conversation._sequence
+    talk.conversation.ping()
+    assert talk.link.sent == [messages.ping(number, answer_after_us=0)]

@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from hapticd.tick.space.channel import lay_along
 from hapticd.tick.space.solid_contact import OUTSIDE_S
 from tests.tick.rig import law, running
-from tests.tick.space.rig import PERIOD_S, Point, Rig, apart, ball
+from tests.tick.space.rig import PERIOD_S, Point, Rig, apart, ball, length, table
 
 ROUGH: dict[str, Any] = {"static_friction": 0.8, "dynamic_friction": 0.6}
 ABOVE: Point = (0.0, 0.0, 0.031)
@@ -43,6 +46,33 @@ def test_the_forces_of_all_directions_add_up_to_the_spring_between_device_and_pr
     spring = [5000.0 * (proxy.depth_m * n + s) for n, s in zip(normal, stretch, strict=True)]
     assert apart(rig.force, spring) < 1e-9
     assert apart(rig.force, (0.0, 0.0, 0.0)) > 3.0
+    assert rig.tick.requested_n == pytest.approx(rig.force)
+
+
+@given(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda n: length(n) > 0.1))
+def test_the_three_directions_of_a_rough_surface_stand_across_each_other(normal: Point) -> None:
+    channels = pressed(ball(**ROUGH)).tick.solids[0].channels
+    channels[0].dx, channels[0].dy, channels[0].dz = (value / length(normal) for value in normal)
+    lay_along(channels)
+    along = [(channel.dx, channel.dy, channel.dz) for channel in channels]
+    for number, one in enumerate(along):
+        for other_number, other in enumerate(along):
+            across = sum(a * b for a, b in zip(one, other, strict=True))
+            assert across == pytest.approx(float(number == other_number), abs=1e-12)
+
+
+def test_a_straight_press_has_the_same_books_on_a_rough_surface_and_on_a_smooth_one() -> None:
+    """Pressed, let out half, pressed beyond the limit: what is stored, made and taken, each for itself."""
+    books = []
+    for keys in ({}, ROUGH):
+        rig = Rig(table("table", "plane", **keys), "none").start((0.0, 0.0, 0.001))
+        for z_m in (-0.001, -0.0005, -0.003):
+            rig.to((0.0, 0.0, z_m), 30)
+        ledger = rig.totals.ledger
+        books.append((ledger.stored_j, ledger.generated_j, ledger.dissipated_j))
+    assert books[0] == pytest.approx(books[1], rel=1e-9, abs=1e-12)
+    assert books[0][0] == pytest.approx(12.0 * (0.003 - 0.5 * 12.0 / 5000.0))  # flat from 12 N on
+    assert books[0][1] > 1e-4
 
 
 def test_a_law_is_shown_what_of_its_force_and_of_the_contacts_was_applied() -> None:
