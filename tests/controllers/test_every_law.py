@@ -121,16 +121,26 @@ def test_a_start_leaves_nothing_of_what_came_before_it(law: ModuleType) -> None:
         assert bits(used) == bits(fresh)
 
 
-@pytest.mark.parametrize(
-    "law", [law for law in LAWS if law is not damper], ids=lambda law: law.__name__.rpartition(".")[2]
-)
-def test_outside_a_wall_no_law_asks_for_a_force(law: ModuleType) -> None:
-    """But for the bare damper, which brakes wherever it is asked: there the loop sends nothing."""
+@each_law
+def test_outside_a_wall_no_law_asks_for_a_force_but_the_bare_damper(law: ModuleType) -> None:
+    """That one brakes wherever it is asked, and the loop sends nothing there."""
+    resting_n = -100.0 if law is damper else 0.0
     state, params = fresh_state(law), plain_object("Params", scalar_params(law.Params()))
     law.start(state, params, LawSnapshot(-1e-3, 0.02, 3.0, 2e-3, 40.0))
     law.step(state, params, LawTick(x_m=-1e-3, in_contact=True, contact_n=8.0, spring_n=8.0))
     for _ in range(3):
-        assert law.step(state, params, LawTick(x_m=1e-3, moved_m=2e-3, velocity_m_per_s=2.0, applied_n=8.0)) == 0.0
+        assert (
+            law.step(state, params, LawTick(x_m=1e-3, moved_m=2e-3, velocity_m_per_s=2.0, applied_n=8.0)) == resting_n
+        )
+
+
+@pytest.mark.parametrize("law", [tdpa, energy_cycle, energy_bounding, set_position], ids=lambda law: law.__name__)
+def test_a_debt_beyond_all_bounds_stays_a_debt_and_a_credit_is_none(law: ModuleType) -> None:
+    state, params = fresh_state(law), plain_object("Params", scalar_params(law.Params()))
+    law.start(state, params, LawSnapshot(debt_j=1e300))
+    assert -1e15 < state.energy_j < -1e6
+    law.start(state, params, LawSnapshot(debt_j=-1e300))
+    assert state.energy_j == 0.0
 
 
 @pytest.mark.parametrize("law", [damper, set_position], ids=lambda law: law.__name__.rpartition(".")[2])

@@ -84,3 +84,13 @@ def test_what_a_jump_does_not_cost_is_left_for_the_next_one() -> None:
         tick = LawTick(x_m=x_m, moved_m=moved_m, in_contact=True, contact_n=force_n, spring_n=force_n)
         assert set_position.step(state, params, tick) == pytest.approx(force_n)
         assert state.energy_j == pytest.approx(left_j)
+
+
+def test_a_jump_that_cannot_be_paid_for_goes_as_far_as_all_that_is_left() -> None:
+    """K (x - x_s)^2 / 2 = B dx^2 / dt, and nothing is kept of it."""
+    state, params = fresh_state(set_position), Params(damping_n_s_per_m=50.0)
+    set_position.start(state, params, LawSnapshot())
+    tick = LawTick(x_m=-1e-3, moved_m=-1e-4, in_contact=True, contact_n=10.0, spring_n=10.0)
+    assert set_position.step(state, params, tick) == pytest.approx((2.0 * 1e4 * 50.0 * 1e-8 / 1e-3) ** 0.5)
+    assert state.set_position_m == pytest.approx(-1e-3 + (2.0 * 5e-4 / 1e4) ** 0.5)
+    assert state.energy_j == 0.0

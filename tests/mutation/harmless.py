@@ -15,6 +15,9 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "controllers/hapticd_controllers/energy_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
         "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
         "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
+        "controllers/hapticd_controllers/set_position.py: step: if budget_j >= asked_j:  [GtE 0 is Gt]",
+        "controllers/hapticd_controllers/tdpa.py: step: if params.reset == RESET_CONTACT and state.energy_j > 0.0:  "
+        "[Gt 0 is GtE]",
         "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 1 is Lt]",
     ),
     "a longer frame is no intact message either, and less than a microsecond is none": (

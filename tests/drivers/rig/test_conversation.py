@@ -183,8 +183,8 @@ class Answering(Scripted):
             self.heard.append([with_flags(number, sequence, self.flags.popleft())])
 
 
-def refused(reason: int, of: int) -> bytes:
-    body = _REFUSED.pack(messages.VERSION, messages.REFUSED, 0, 0, 0, reason, of)
+def refused(sequence: int, reason: int, of: int) -> bytes:
+    body = _REFUSED.pack(messages.VERSION, messages.REFUSED, sequence, 0, 0, reason, of)
     return body + messages.checksum(body).to_bytes(2, "little")
 
 
@@ -238,7 +238,7 @@ def test_the_rigs_own_counts_are_added_from_the_second_pong_on(talk: Talk) -> No
 
 def test_a_rig_that_was_switched_off_and_on_counts_anew(talk: Talk) -> None:
     assert talk.hears(500, 501) == [500, 501]
-    talk.link.heard.append([refused(messages.NO_HELLO, messages.POLL)])
+    talk.link.heard.append([refused(0, messages.NO_HELLO, messages.POLL)])
     with pytest.raises(DeviceDisconnectedError, match="has restarted, or was switched off and on"):
         talk.conversation.newest()
     assert talk.hears(1, 2) == [1, 2]
@@ -283,7 +283,10 @@ def test_questions_without_an_answer_are_counted_until_one_comes(talk: Talk) -> 
 
 
 def test_a_rig_of_another_version_is_told_at_once_and_what_else_it_refuses_is_not_the_answer(talk: Talk) -> None:
-    talk.link.heard += [[refused(messages.NO_HELLO, messages.POLL)], [refused(messages.WRONG_VERSION, messages.HELLO)]]
+    talk.link.heard += [
+        [refused(1, messages.NO_HELLO, messages.POLL)],
+        [refused(2, messages.WRONG_VERSION, messages.HELLO)],
+    ]
     with pytest.raises(DeviceProtocolError, match="it speaks another version of the protocol"):
         talk.conversation.greet()
     assert not talk.link.heard
@@ -292,4 +295,4 @@ def test_a_rig_of_another_version_is_told_at_once_and_what_else_it_refuses_is_no
 def test_a_rig_is_asked_for_its_counts_without_a_delay(talk: Talk) -> None:
     number = talk.conversation._sequence
     talk.conversation.ping()
-    assert talk.link.sent == [messages.ping(number, answer_after_us=0)]
+    assert talk.link.sent == [messages.ping(number, 0)]

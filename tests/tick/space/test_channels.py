@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.tick.space.channel import lay_along
-from hapticd.tick.space.solid_contact import OUTSIDE_S
+from hapticd.tick.contact import RunningLaw
+from hapticd.tick.energy import EnergyLedger
+from hapticd.tick.space.channel import Channel, lay_along
+from hapticd_controllers import none
 from tests.tick.rig import law, running
 from tests.tick.space.rig import PERIOD_S, Point, Rig, apart, ball, length, table
 
@@ -49,12 +51,14 @@ def test_the_forces_of_all_directions_add_up_to_the_spring_between_device_and_pr
     assert rig.tick.requested_n == pytest.approx(rig.force)
 
 
+CHANNELS = [Channel(RunningLaw(none, none.Params()), 0.0, EnergyLedger()) for _ in range(3)]
+
+
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda n: length(n) > 0.1))
 def test_the_three_directions_of_a_rough_surface_stand_across_each_other(normal: Point) -> None:
-    channels = pressed(ball(**ROUGH)).tick.solids[0].channels
-    channels[0].dx, channels[0].dy, channels[0].dz = (value / length(normal) for value in normal)
-    lay_along(channels)
-    along = [(channel.dx, channel.dy, channel.dz) for channel in channels]
+    CHANNELS[0].dx, CHANNELS[0].dy, CHANNELS[0].dz = (value / length(normal) for value in normal)
+    lay_along(CHANNELS)
+    along = [(channel.dx, channel.dy, channel.dz) for channel in CHANNELS]
     for number, one in enumerate(along):
         for other_number, other in enumerate(along):
             across = sum(a * b for a, b in zip(one, other, strict=True))
@@ -80,7 +84,7 @@ def test_a_law_is_shown_what_of_its_force_and_of_the_contacts_was_applied() -> N
 
     def step(_state: Any, _params: Any, tick: Any) -> float:
         shown.append((tick.contact_n, tick.applied_n, tick.applied_contact_n))
-        return tick.contact_n + 0.25
+        return float(tick.contact_n) + 0.25
 
     rig = Rig(ball(), "none").start(ABOVE)
     for _ in rig.tick.switch(make_law=running(law(step))):
@@ -118,4 +122,10 @@ def test_a_law_that_keeps_time_is_asked_for_half_a_second_after_the_touch_and_no
     asked = 0
     for count in range(1000):
         rig.go((0.0, 0.0, 0.0301 + 1e-6 * (count % 2)))
-    assert asked == pytest.approx(OUTSIDE_S / PERIOD_S, abs=5)
+    assert asked == pytest.approx(500, abs=5)
+
+
+def test_a_start_beside_an_object_is_as_far_from_it_as_the_device_is() -> None:
+    at = (0.012, 0.005, 0.034)
+    rig = Rig(ball(position_m=(0.01, 0.0, 0.0))).start(at)
+    assert rig.tick.solids[0].solid.proxy.d == pytest.approx(apart(at, (0.01, 0.0, 0.0)) - 0.03, abs=1e-9)
