@@ -173,7 +173,6 @@ class Guard:
             return False
         self.mode = Mode.ARMED
         self.gain = 1.0
-        self._changing = True
         return True
 
     def release(self, ramp_s: float, latch: bool = False) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from hapticd.law import LawSnapshot, LawTick, fresh_state
 from hapticd_controllers import damper, virtual_coupling
 from hapticd_controllers.virtual_coupling import Params
 
@@ -96,3 +97,25 @@ def test_the_rule_by_tustin_allows_four_times_what_the_loop_bears() -> None:
 def test_one_sample_late_the_defaults_ring(stiffness_n_per_m: float) -> None:
     late = Device(stiffness_n_per_m=stiffness_n_per_m, delay_samples=1)
     assert not any(rest.still for rest in rests(virtual_coupling, late, drive=machine.drive))
+
+
+def test_a_second_touch_is_as_the_first() -> None:
+    """Outside the proxy goes with the device: where it was at the last touch counts for nothing."""
+    state, params = fresh_state(virtual_coupling), Params()
+    virtual_coupling.start(state, params, LawSnapshot(x_m=1e-3))
+    touch = LawTick(x_m=-1e-3, moved_m=-2e-3, in_contact=True, contact_n=12.0, spring_n=12.0)
+    first_n = virtual_coupling.step(state, params, touch)
+    virtual_coupling.step(
+        state, params, LawTick(x_m=-5e-3, moved_m=-4e-3, in_contact=True, contact_n=60.0, spring_n=60.0)
+    )
+    assert virtual_coupling.step(state, params, LawTick(x_m=1e-3, moved_m=6e-3)) == 0.0
+    assert virtual_coupling.step(state, params, touch) == first_n > 1.0
+
+
+def test_a_wall_as_soft_as_air_is_shown_as_it_is() -> None:
+    state, params = fresh_state(virtual_coupling), Params()
+    virtual_coupling.start(state, params, LawSnapshot(x_m=-1e-3))
+    still = LawTick(x_m=-1e-3, in_contact=True, contact_n=0.5e-3, spring_n=0.5e-3)
+    for _ in range(100):
+        force_n = virtual_coupling.step(state, params, still)
+    assert force_n == pytest.approx(0.5e-3, rel=1e-3)

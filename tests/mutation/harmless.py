@@ -6,6 +6,8 @@ EQUAL: dict[str, tuple[str, ...]] = {
     "at the very bound both give the same number": (
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 0 is Lt]",
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 1 is Lt]",
+        "hapticd/tick/guard.py: let_out: return gain if gain * ramp_s >= dt_s * (1.0 - 1e-06) else 0.0  [GtE 0 is Gt]",
+        "controllers/hapticd_controllers/virtual_coupling.py: step: if proxy_m < 0.0:  [Lt 0 is LtE]",
         "hapticd/tick/guard.py: blended: if weight >= 1.0:  [GtE 0 is Gt]",
         "hapticd/tick/guard.py: blended: weight: float = done / state.blend_ticks if done > 0.0 else 0.0  "
         "[Gt 0 is GtE]",
@@ -15,6 +17,10 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "controllers/hapticd_controllers/energy_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
         "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
         "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
+        "controllers/hapticd_controllers/tdpa.py: step: if not params.carry_debt and state.energy_j < "
+        "state.reference_j:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/tdpa.py: step: if params.damping_cap_n_s_per_m > 0.0 and damping > "
+        "params.damping_cap_n_s_per_m:  [Gt 0 is GtE]",
         "controllers/hapticd_controllers/set_position.py: step: if budget_j >= asked_j:  [GtE 0 is Gt]",
         "controllers/hapticd_controllers/tdpa.py: step: if params.reset == RESET_CONTACT and state.energy_j > 0.0:  "
         "[Gt 0 is GtE]",
@@ -37,6 +43,9 @@ EQUAL: dict[str, tuple[str, ...]] = {
     ),
     "no clock and no sum of measured places comes to it exactly": (
         "drivers/hapticd_drivers/rig/conversation.py: Conversation.await_state: if left_ns <= 0:  [LtE 0 is Lt]",
+        "drivers/hapticd_drivers/rig/motion.py: _go: if now.time_s - start.time_s > longest_s:  [Gt 0 is GtE]",
+        "drivers/hapticd_drivers/rig/motion.py: _settled: if abs(now.position_m - since.position_m) > still_m:  "
+        "[Gt 0 is GtE]",
         "hapticd/supervisor/recovery.py: HotplugWatch.news: if now_s < self._due_s:  [Lt 0 is LtE]",
         "hapticd/supervisor/recovery.py: Recovery.begin: if now_s - self._found_s > STEADY_S:  [Gt 0 is GtE]",
         "drivers/hapticd_drivers/rig/motion.py: find_stop: if abs(end.position_m - first.position_m) > max(AGREE_M, "
@@ -64,6 +73,7 @@ EQUAL: dict[str, tuple[str, ...]] = {
     "it is set before it is read": (
         "hapticd/tick/space/channel.py: Channel.__init__: def __init__  [without self.dz = 1.0]",
         "hapticd/tick/contact.py: Contact.__init__: def __init__  [without self.x_m = 0.0]",
+        "hapticd/tick/guard.py: Guard.__init__: def __init__  [without self._ramp_s = safety.ramp_s]",
         "hapticd/tick/tick.py: ControlTick.__init__: def __init__  [without self._excused = False]",
         "hapticd/tick/energy.py: EnergyLedger.__init__: self.window_minimum_j = 0.0  [0.0 is 1.0]",
         "hapticd/tick/energy.py: EnergyLedger.__init__: def __init__  [without self.window_minimum_j = 0.0]",

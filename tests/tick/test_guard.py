@@ -117,7 +117,7 @@ def test_a_refused_configuration_changes_nothing() -> None:
 
 
 def test_over_speed_is_a_matter_of_real_devices_unless_named() -> None:
-    assert guard().max_speed_m_per_s == DEFAULT_MAX_SPEED_M_PER_S
+    assert guard().max_speed_m_per_s == DEFAULT_MAX_SPEED_M_PER_S == 2.0
     assert guard(max_speed_m_per_s=0.5).max_speed_m_per_s == 0.5
     assert guard(device(simulated=True)).max_speed_m_per_s == math.inf
     assert guard(device(simulated=True), max_speed_m_per_s=0.5).max_speed_m_per_s == 0.5
@@ -308,3 +308,16 @@ def test_limits_that_are_under_way_arrive_while_the_device_is_disarmed() -> None
     for _ in range(60):
         made.reduce([0.0, 0.0, 0.0], PERIOD_S)
     assert (made.max_force_n, made.max_axis_n, made.limit_n) == (10.0, 10.0, 10.0)
+
+
+def test_a_limit_on_the_whole_force_goes_up_by_a_ramp_also_where_no_axis_may_have_more() -> None:
+    made = armed(max_force_n=6.0, max_axis_force_n=5.0)
+    made.configure(SafetyConfig(max_force_n=8.0, max_axis_force_n=5.0), device())
+    lengths = []
+    for _ in range(60):
+        force_n = [5.0, 5.0]
+        made.reduce(force_n, PERIOD_S)
+        lengths.append(math.hypot(*force_n))
+    assert lengths[0] == pytest.approx(6.0 + 2.0 / 50.0)
+    assert lengths[24] == pytest.approx(7.0)
+    assert lengths[-1] == pytest.approx(math.hypot(5.0, 5.0))

@@ -326,8 +326,19 @@ def test_a_handle_at_its_end_is_taken_off_it_first_and_each_drive_begins_without
     handle.position_m = -0.03
     motion.find_stop(drive_of(handle), -1.0)
     assert handle.turned_at_m > -0.03 + 0.8 * motion.BACK_OFF_M
-    assert handle.forces_n[0] == 0.0
     assert max(map(abs, handle.forces_n[:10])) < 0.2 * BOUND_N
+    switched = Handle(switch_m=-0.02)
+    motion.find_switch(drive_of(switched), -1.0)
+    assert max(map(abs, switched.forces_n[:10])) < 0.2 * BOUND_N
+
+
+def test_a_switch_that_never_closes_is_told_once_the_handle_has_been_held_up_for_long_enough() -> None:
+    """0.3 s, and the time that the drive takes to pull with its whole force; then 0.1 s at rest."""
+    handle = Handle(stops_m=(-1e-6, 1e-6))
+    with pytest.raises(DeviceFaultError, match="the home switch does not close"):
+        motion.find_switch(drive_of(handle), -1.0)
+    assert handle.time_s == pytest.approx(0.3 + 2e-3 / 0.02 + 0.1, abs=0.01)
+    assert min(handle.forces_n) == pytest.approx(-BOUND_N, rel=0.01)
 
 
 def test_a_nudge_rises_alike_both_ways() -> None:
