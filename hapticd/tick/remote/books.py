@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hapticd.tick.energy import EnergyLedger
+from hapticd.tick.remote.ramped import Ramped
 
 
 class PortBooks:
@@ -26,7 +27,8 @@ class PortBooks:
         self.ledger = EnergyLedger()
         self.moved_j = 0.0
         self.carried_j = 0.0
-        self._gain = self._weight = self._stiffness = self._limit_n = 0.0
+        self._stiffness = Ramped(0.0)
+        self._gain = self._weight = self._limit_n = 0.0
 
     def carry(self, work_j: float) -> None:
         """Enter the work of the force that was held along the target's way [J]."""
@@ -51,21 +53,21 @@ class PortBooks:
             damping_n_s_per_m: damping of the law now, entered with a completed cycle [N s/m].
             dt_s: time since the last sample [s].
         """
-        stored_j = self._gain * self._weight * _stored_j(self._stiffness, stretch_m, self._limit_n)
+        stored_j = self._gain * self._weight * self._stiffness.stored(stretch_m, self._limit_n)
         self.ledger.update(-1.0, taken_j, spring_j, stored_j, in_contact, damping_n_s_per_m, dt_s)
 
-    def change(self, stiffness_n_per_m: float, stretch_m: float, gain: float, weight: float, limit_n: float) -> None:
+    def change(self, stiffness: Ramped, stretch_m: float, gain: float, weight: float, limit_n: float) -> None:
         """Enter what has become of the spring: that is the client's work, but what a release lets go is lost.
 
         Args:
-            stiffness_n_per_m: now [N/m].
+            stiffness: now [N/m].
             stretch_m: its length now [m].
             gain: how much of the force a release has left, 0 to 1.
             weight: how much of it the port's own ramp lets through, 0 to 1.
             limit_n: largest force of the spring [N].
         """
         ledger = self.ledger
-        stored_j = gain * weight * _stored_j(stiffness_n_per_m, stretch_m, limit_n)
+        stored_j = gain * weight * stiffness.stored(stretch_m, limit_n)
         held_j = ledger.stored_j
         if gain < self._gain:
             lost_j = held_j * (1.0 - gain / self._gain)
@@ -73,7 +75,7 @@ class PortBooks:
             held_j -= lost_j
         self.moved_j += stored_j - held_j
         ledger.stored_j = stored_j
-        self._stiffness = stiffness_n_per_m
+        stiffness.copy_to(self._stiffness)
         self._limit_n = limit_n
         self._gain = gain
         self._weight = weight
@@ -83,11 +85,3 @@ class PortBooks:
         self.ledger.dissipated_j += self.ledger.stored_j
         self.ledger.stored_j = 0.0
         self._gain = self._weight = 0.0
-
-
-def _stored_j(stiffness_n_per_m: float, stretch_m: float, limit_n: float) -> float:
-    """Energy in the spring [J]: k s^2 / 2, and force times length where a limit flattens it."""
-    spring_n = stiffness_n_per_m * stretch_m
-    if spring_n <= limit_n:
-        return 0.5 * spring_n * stretch_m
-    return limit_n * (stretch_m - 0.5 * limit_n / stiffness_n_per_m)

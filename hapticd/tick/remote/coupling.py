@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import sqrt
 
 from hapticd.config.remote import PortLimits
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.follower import Follower
-from hapticd.tick.remote.one_port import OnePort, towards
+from hapticd.tick.remote.one_port import OnePort
+from hapticd.tick.remote.ramped import Ramped
 from hapticd.tick.remote.update import DAMPING, POSITION, STIFFNESS, VELOCITY, Update
 from hapticd.tick.space.channel import LEAST_M
 
@@ -16,7 +18,7 @@ from hapticd.tick.space.channel import LEAST_M
 class Coupling(OnePort):
     """A coupling, ready for the tick.
 
-        f = -k (p - q) - b (v - dq/dt)      p the device, q the followed target
+        f = -k (p - q) - b (v - dq/dt)      p the device, q the followed target; each term within the limit
 
     It pulls as well as it pushes, so that its laws see a contact that is not lost while it is held.
 
@@ -30,17 +32,10 @@ class Coupling(OnePort):
 
     Attributes:
         follower: the followed target.
-        damping_n_s_per_m: in force now, without the law's [N s/m].
+        damping: of its damper, without the law's [N s/m].
     """
 
-    __slots__ = (
-        "_damping_change",
-        "_goal_damping",
-        "_goal_stiffness",
-        "_stiffness_change",
-        "damping_n_s_per_m",
-        "follower",
-    )
+    __slots__ = ("_speed_m_per_s", "_stretch_m", "damping", "follower")
 
     def __init__(
         self,
@@ -54,9 +49,8 @@ class Coupling(OnePort):
         super().__init__(limits, motion, make_law, resolution_m, period_s, ramp_s)
         self.follower = Follower(len(self.channels), limits.max_speed_m_per_s, limits.hold_s)
         self.target_m = self.follower.at_m
-        self.damping_n_s_per_m = self._goal_damping = limits.damping_n_s_per_m
-        self._goal_stiffness = limits.stiffness_n_per_m
-        self._stiffness_change = self._damping_change = 0.0
+        self.damping = Ramped(limits.damping_n_s_per_m)
+        self._stretch_m = self._speed_m_per_s = 0.0
 
     def change(self, limits: PortLimits) -> None:
         """Go on under other limits, and with what they say of the spring until the client says otherwise."""
@@ -75,40 +69,48 @@ class Coupling(OnePort):
             stiffness = min(max(update.stiffness_n_per_m, 0.0), stiffness)
         if update.said & DAMPING:
             damping = min(max(update.damping_n_s_per_m, 0.0), damping)
-        if stiffness != self._goal_stiffness or damping != self._goal_damping:
-            self._aim(stiffness, damping)
+        self._aim(stiffness, damping)
         return True
 
     def _aim(self, stiffness_n_per_m: float, damping_n_s_per_m: float) -> None:
         """Have stiffness and damping go to these by a ramp."""
-        self._goal_stiffness = stiffness_n_per_m
-        self._goal_damping = damping_n_s_per_m
-        self._stiffness_change = stiffness_n_per_m - self.stiffness_n_per_m
-        self._damping_change = damping_n_s_per_m - self.damping_n_s_per_m
+        if stiffness_n_per_m != self.stiffness.goal:
+            self.stiffness.aim(stiffness_n_per_m, self._stretch_m, self.limit_n)
+        if damping_n_s_per_m != self.damping.goal:
+            self.damping.aim(damping_n_s_per_m, self._speed_m_per_s, self.limit_n)
 
     def _begin(self) -> None:
         motion = self.motion
         self.follower.begin(motion.position_m, motion.velocity_m_per_s)
-        self.stiffness_n_per_m = self._goal_stiffness
-        self.damping_n_s_per_m = self._goal_damping
-        self._stiffness_change = self._damping_change = 0.0
+        self.stiffness.arrive()
+        self.damping.arrive()
 
     def _see(self, dt_s: float) -> None:
         follower = self.follower
-        begins = not self.channels[0].in_contact
-        if not begins:
+        if self.channels[0].in_contact:  # else it has just begun
             follower.move(dt_s)
         motion = self.motion
-        stiffness = self.stiffness_n_per_m
-        for axis, channel in enumerate(self.channels):
-            position_m = motion.position_m[axis]
-            x_m = position_m - follower.at_m[axis]
-            if -LEAST_M < x_m < LEAST_M:
-                x_m = -LEAST_M
-            moved_m = position_m - self._from_m[axis] - follower.moved_m[axis]
+        x_m, speeds = [], []
+        x_squared = speed_squared = 0.0
+        for axis in range(len(self.channels)):
+            x = motion.position_m[axis] - follower.at_m[axis]
+            x_m.append(x)
+            x_squared += x * x
             speed = motion.velocity_m_per_s[axis] - follower.speed_m_per_s[axis]
-            spring_n = -stiffness * x_m
-            channel.see(1.0, x_m, moved_m, speed, dt_s, spring_n, spring_n - self.damping_n_s_per_m * speed)
+            speeds.append(speed)
+            speed_squared += speed * speed
+        self._stretch_m = stretch_m = sqrt(x_squared)
+        self._speed_m_per_s = speed_m_per_s = sqrt(speed_squared)
+        limit_n = self.limit_n
+        k = self.stiffness.force(stretch_m, limit_n) / stretch_m if stretch_m > LEAST_M else self.stiffness.now
+        b = self.damping.force(speed_m_per_s, limit_n) / speed_m_per_s if speed_m_per_s > 0.0 else 0.0
+        for axis, channel in enumerate(self.channels):
+            x = x_m[axis]
+            if -LEAST_M < x < LEAST_M:
+                x = -LEAST_M
+            moved_m = motion.position_m[axis] - self._from_m[axis] - follower.moved_m[axis]
+            spring_n = -k * x
+            channel.see(1.0, x, moved_m, speeds[axis], dt_s, spring_n, spring_n - b * speeds[axis])
 
     def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
         moved_m = self.follower.moved_m
@@ -117,10 +119,6 @@ class Coupling(OnePort):
 
     def _go_on(self, passed_s: float) -> None:
         super()._go_on(passed_s)
-        if self._stiffness_change != 0.0 or self._damping_change != 0.0:
-            step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
-            stiffness = towards(self.stiffness_n_per_m, self._goal_stiffness, self._stiffness_change * step)
-            damping = towards(self.damping_n_s_per_m, self._goal_damping, self._damping_change * step)
-            self.stiffness_n_per_m, self.damping_n_s_per_m = stiffness, damping
-            if stiffness == self._goal_stiffness and damping == self._goal_damping:
-                self._stiffness_change = self._damping_change = 0.0
+        step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
+        self.stiffness.go_on(step)
+        self.damping.go_on(step)

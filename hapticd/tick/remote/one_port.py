@@ -16,6 +16,7 @@ from hapticd.tick.guard import start_blend
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.books import PortBooks
 from hapticd.tick.remote.port import Port, PortState
+from hapticd.tick.remote.ramped import Ramped
 from hapticd.tick.remote.update import Update
 from hapticd.tick.space.channel import LEAST_M, Channel
 
@@ -49,7 +50,8 @@ class OnePort(Port):
         weight: how much of its force is let through, 0 let go to 1.
         scale: of what the laws asked for in this tick, how much is left by ramp and limit.
         most_n: largest force now; it moves to that of `limits` by a ramp [N].
-        stiffness_n_per_m: in force now [N/m].
+        limit_n: the same, or the guard's where that is less [N].
+        stiffness: of its spring [N/m].
         leaving: the scene has it no more.
     """
 
@@ -64,11 +66,12 @@ class OnePort(Port):
         "books",
         "channels",
         "leaving",
+        "limit_n",
         "most_n",
         "motion",
         "ramp_s",
         "scale",
-        "stiffness_n_per_m",
+        "stiffness",
         "weight",
     )
 
@@ -87,8 +90,8 @@ class OnePort(Port):
         self.books = PortBooks()
         self.channels = [PortAxis(self, axis, make_law(), resolution_m) for axis in range(axes)]
         self.ramp_s = ramp_s
-        self.most_n = limits.max_force_n
-        self.stiffness_n_per_m = limits.stiffness_n_per_m
+        self.most_n = self.limit_n = limits.max_force_n
+        self.stiffness = Ramped(limits.stiffness_n_per_m)
         self.weight = self.scale = 0.0
         self.asleep = True
         self.leaving = False
@@ -189,7 +192,7 @@ class OnePort(Port):
         if self.asleep:
             return
         channels = self.channels
-        limit_n = min(limit_n, self.most_n)
+        self.limit_n = limit_n = min(limit_n, self.most_n)
         if dt_s > 0.0:
             self._enter(gain, limit_n, dt_s)
         spring_squared = 0.0
@@ -228,7 +231,7 @@ class OnePort(Port):
         stretch_m = sqrt(x_squared)
         damping = max([channel.damping_n_s_per_m for channel in self.channels])
         self.books.enter(taken_j, spring_j, stretch_m, self.channels[0].in_contact, damping, dt_s)
-        self.books.change(self.stiffness_n_per_m, stretch_m, gain, self.weight, limit_n)
+        self.books.change(self.stiffness, stretch_m, gain, self.weight, limit_n)
 
     def _go_on(self, passed_s: float) -> None:
         """Count time: of the client's silence, of the ramps, of the force that was held."""
@@ -242,7 +245,9 @@ class OnePort(Port):
             self.weight = self.weight - step if self.weight > step else 0.0
         goal_n = self.limits.max_force_n
         if self.most_n != goal_n:
-            self.most_n = towards(self.most_n, goal_n, self._most_change_n * step)
+            change_n = self._most_change_n * step
+            most_n = self.most_n + change_n
+            self.most_n = min(goal_n, most_n) if change_n > 0.0 else max(goal_n, most_n)
 
     def _limit(self) -> None:
         """Bring what the laws ask for under ramp and limit."""
@@ -406,8 +411,3 @@ class PortAxis(Channel):
         """What a law that takes over now starts from: where and how fast it is as seen from the target."""
         del velocity_m_per_s
         return super().snapshot()
-
-
-def towards(now: float, goal: float, change: float) -> float:
-    """A value after a step of its ramp to another one; never past it."""
-    return min(goal, now + change) if change > 0.0 else max(goal, now + change)

@@ -173,7 +173,7 @@ def test_stiffness_and_damping_go_over_by_a_ramp_and_no_further_than_the_file_al
         rig.say("tool", position_m=[2e-3], stiffness_n_per_m=1e6, damping_n_s_per_m=1e6)
         rig.go()
     assert rig.force == pytest.approx([4.0])
-    assert rig["tool"].damping_n_s_per_m == B
+    assert rig["tool"].damping.now == B
 
 
 def test_a_disarmed_device_has_no_force_and_after_arming_it_comes_in_by_the_ramp() -> None:
