@@ -25,6 +25,7 @@ from hapticd.tick.contact_record import (
     wall_record,
 )
 from hapticd.tick.flags import Flag
+from hapticd.tick.remote.port_record import PortLayout, PortsRecord
 
 if TYPE_CHECKING:  # clients read records without the tick that makes them
     from hapticd.device import Sample
@@ -55,6 +56,7 @@ class TickRecord:
         orientation: rotation matrix row by row, empty without a wrist.
         walls: one an entry of scene.walls, in order.
         space: what objects add; None in a scene without.
+        ports: what clients drive; None in a scene without.
     """
 
     seq: int
@@ -78,12 +80,15 @@ class TickRecord:
     orientation: tuple[float, ...]
     walls: tuple[WallRecord, ...]
     space: SpaceRecord | None = None
+    ports: PortsRecord | None = None
 
 
 _SCALARS = [field for field in fields(TickRecord) if field.type in CODES]
 _HEAD = "".join(CODES[str(field.type)] for field in _SCALARS) + "q"  # and the number of walls
 _WALLS = 256
 """What stands where the number of walls does: that number, and this times one more than the number of objects."""
+_PORTS = 65536
+"""And this more where ports follow behind the rest."""
 _UNCALIBRATED = int(Flag.UNCALIBRATED)
 
 
@@ -91,7 +96,7 @@ class RecordLayout:
     """Where the fields of a record lie, for a device with `axes` axes.
 
     First the scalars in the order of `TickRecord` and the number of walls, then the axes, the orientation, the walls,
-    and where the device has the three axes that it takes what `SpaceRecord` has.
+    where the device has the three axes that it takes what `SpaceRecord` has, and behind it the ports.
 
     Args:
         axes: translation axes of the device.
@@ -119,8 +124,9 @@ class RecordLayout:
                 for struct in self._structs
             ]
             full = self._in_space[-1][-1]
-        self.size = full.size
-        self.format = full.format
+        self._ports = PortLayout(axes)
+        self.size = full.size + self._ports.size
+        self.format = full.format + self._ports.format
         self.pack = self.pack_walls
 
     def struct(self, walls: int) -> Struct:
@@ -130,6 +136,8 @@ class RecordLayout:
     def serve(self, tick: ControlTick) -> None:
         """Pack from now on what the scene of a tick has."""
         self.pack = self.pack_space if tick.has_objects else self.pack_walls
+        if tick.has_ports:
+            self.pack = self.pack_ports
 
     def pack_walls(
         self,
@@ -271,10 +279,71 @@ class RecordLayout:
             *values,
         )
 
+    def pack_ports(
+        self,
+        area: memoryview,
+        at: int,
+        tick: ControlTick,
+        sample: Sample,
+        seq: int,
+        deadline_ns: int,
+        late_us: float,
+        busy_us: float,
+        skipped: int,
+        law: int,
+    ) -> None:
+        """The same for a scene with couplings, forces or remote objects, and with what else it has."""
+        motion = tick.motion
+        books = tick.totals()
+        totals = books.ledger
+        values: list[float] = []
+        for contact in tick.contacts:
+            values += contact_values(contact, contact.wall.stiffness_n_per_m, contact.ledger)
+        walls = count = len(tick.contacts)
+        work_j = tick.port_work_j()
+        struct = self._structs[walls]
+        if tick.has_objects:
+            scene = cast("SpaceTick", tick)
+            values += (scene.objects, books.moved_j - work_j, books.friction_j, books.friction_stored_j)
+            x, y, z = motion.position_m
+            near = scene.awake if len(scene.awake) <= MOST_OBJECTS else sorted(scene.awake, key=untouched)
+            shown = [each for each in near[:MOST_OBJECTS] if not each.leaving]
+            for each in shown:
+                values += object_values(each, x, y, z)
+            struct = self._in_space[walls][len(shown)]
+            count += _WALLS * (len(shown) + 1)
+        struct.pack_into(
+            area,
+            at,
+            seq,
+            deadline_ns,
+            late_us,
+            busy_us,
+            motion.dt_s,
+            skipped,
+            tick.flags if sample.calibrated else tick.flags | _UNCALIBRATED,
+            law,
+            sample.buttons,
+            sample.gripper_m,
+            totals.energy_j,
+            totals.stored_j,
+            totals.dissipated_j,
+            totals.generated_j,
+            count + _PORTS,
+            *motion.position_m,
+            *motion.velocity_m_per_s,
+            *tick.force_n,
+            *tick.requested_n,
+            *(sample.orientation if self.orientation else ()),
+            *values,
+        )
+        self._ports.pack(area, at + struct.size, tick, work_j)
+
     def unpack(self, row: bytes | memoryview) -> TickRecord:
         """Decode one record."""
         scalars = len(_SCALARS)
-        count = int.from_bytes(row[scalars * 8 : (scalars + 1) * 8], "little")
+        head = int.from_bytes(row[scalars * 8 : (scalars + 1) * 8], "little")
+        has_ports, count = divmod(head, _PORTS)
         near, walls = divmod(count, _WALLS)
         struct = self._in_space[walls][near - 1] if near else self._structs[walls]
         values = struct.unpack_from(row)
@@ -287,5 +356,6 @@ class RecordLayout:
         for _ in range(walls):
             wall_records.append(wall_record(values[at : at + len(WALL)]))
             at += len(WALL)
-        made = (*values[:scalars], *vectors, tuple(wall_records), space_record(values[at:]) if near else None)
-        return TickRecord(*made)
+        space = space_record(values[at:]) if near else None
+        ports = self._ports.unpack(row, struct.size) if has_ports else None
+        return TickRecord(*values[:scalars], *vectors, tuple(wall_records), space, ports)

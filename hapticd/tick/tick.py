@@ -263,6 +263,11 @@ class ControlTick:
         for port in (*self.couplings, *self.leaving_ports):
             totals.add(port.books)
 
+    def port_work_j(self) -> float:
+        """What the clients of all couplings and forces there ever were have put in [J]."""
+        ports = (*self.couplings, *self.leaving_ports)
+        return self.past_ports.moved_j + sum([port.books.moved_j for port in ports])
+
     def release(self, ramp_s: float | None = None) -> None:
         """Ramp the force to zero and stay disarmed."""
         self.guard.release(self.ramp_s if ramp_s is None else ramp_s)

@@ -213,6 +213,14 @@ class OnePort(Port):
         """What the client's motion, changes and forces have put in, less what they took [J]."""
         return self.books.moved_j
 
+    def law_values(self) -> tuple[float, float, float]:
+        """Stiffness in force [N/m], damping of the law [N s/m] and the mass that it has felt [kg], for a record."""
+        damping = mass = 0.0
+        for channel in self.channels:
+            damping = max(damping, channel.damping_n_s_per_m)
+            mass = max(mass, channel.felt_mass_kg)
+        return self.stiffness.now, damping, mass
+
     def _begin(self) -> None:
         """Come into force where the device is."""
         raise NotImplementedError

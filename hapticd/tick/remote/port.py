@@ -77,6 +77,10 @@ class Port:
         """What the client's motion, changes and forces have put in, less what they took [J]."""
         raise NotImplementedError
 
+    def law_values(self) -> tuple[float, float, float]:
+        """Stiffness in force [N/m], damping of the law [N s/m] and the mass that it has felt [kg], for a record."""
+        raise NotImplementedError
+
     def take(self, update: Update) -> None:
         """Take what the client has said; called between ticks, keeps nothing of the update itself.
 
