@@ -50,8 +50,8 @@ class Energy:
         spring_energy_j: stored in its springs [J].
         dissipated_j: taken by wall damping and law [J].
         generated_j: made by sampling and hold [J].
-        scene_work_j: work that changes of objects did on their springs [J]; with this taken off, `energy_j` is what is
-            stored and dissipated less what was generated.
+        scene_work_j: work that changes of objects did on their springs, and clients on what they drive [J]; with this
+            taken off, `energy_j` is what is stored and dissipated less what was generated.
         friction_j: energy that slipping on objects took, a part of what is dissipated [J].
         friction_energy_j: in the springs along the surfaces of objects now, a part of what is stored [J].
         invalid: a value was not finite and stands here as 0.
@@ -73,13 +73,13 @@ class Energy:
 
 @dataclass(frozen=True, slots=True)
 class Damping:
-    """One tick: what the law did, one element a wall and then one an object.
+    """One tick: what the law did, one element a wall, then one an object, then one a coupling and a force.
 
     Attributes:
         timestamp: seconds since the epoch at the tick's deadline [s].
         seq: tick number.
         damping_n_s_per_m: damping of the law [N s/m].
-        in_contact: whether the device was inside the wall or object.
+        in_contact: whether the device was inside the wall or object, or the coupling or force was in force.
         felt_mass_kg: mass that the law has identified [kg]; 0 while unknown.
         invalid: a value was not finite and stands here as 0.
     """

@@ -18,6 +18,8 @@ import msgpack
 from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.record import TickRecord
+from hapticd.tick.remote.port_record import PortRecord, PortsRecord
+from hapticd.tick.remote.port_state import PortState
 
 SCHEMA = 1
 """Version of the contract; goes up only when a key changes its meaning or goes, which clients must notice."""
@@ -117,10 +119,14 @@ def energy_map(record: TickRecord, timestamp: float) -> Map:
     total = record.energy_j + record.spring_energy_j + record.dissipated_j + record.generated_j
     space = record.space
     if space is not None:
-        fields["scene_work_j"] = space.moved_j
+        fields["scene_work_j"] = space.moved_j + (record.ports.work_j if record.ports else 0.0)
         fields["friction_j"] = space.friction_j
         fields["friction_energy_j"] = space.friction_energy_j
         total += space.moved_j + space.friction_j + space.friction_energy_j
+    elif record.ports is not None:
+        fields["scene_work_j"] = record.ports.work_j
+    if record.ports is not None:
+        total += record.ports.work_j
     return fields if math.isfinite(total) else plain_map(fields)
 
 
@@ -131,25 +137,36 @@ class Objects:
         self._known: list[WallRecord] = []
 
     def see(self, record: TickRecord) -> Sequence[WallRecord]:
-        """Walls and objects of a record, in scene order; records must come in order."""
+        """Walls, objects, couplings and forces of a record, in scene order; records must come in order."""
         space = record.space
+        ports = [] if record.ports is None else [_as_contact(one) for one in pulling(record.ports)]
         if space is None:
             self._known = []
-            return record.walls
+            return [*record.walls, *ports] if ports else record.walls
         if len(self._known) != space.objects:
             self._known = [_UNTOUCHED] * space.objects
         for one in space.near:
             self._known[one.index] = one.contact
-        return [*record.walls, *self._known]
+        return [*record.walls, *self._known, *ports]
+
+
+def pulling(ports: PortsRecord) -> list[PortRecord]:
+    """The couplings and forces of a scene: a record has room for all of them."""
+    return sorted((one for one in ports.shown if one.index >= ports.objects), key=lambda one: one.index)
+
+
+def _as_contact(port: PortRecord) -> WallRecord:
+    held = port.state == PortState.HELD or any(port.force_n)
+    return WallRecord(held, port.stiffness_n_per_m, port.damping_n_s_per_m, port.felt_mass_kg, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 def damping_map(record: TickRecord, timestamp: float, contacts: Sequence[WallRecord] | None = None) -> Map:
-    """hapticd/damping: what the law does at each wall, and then at each object.
+    """hapticd/damping: what the law does at each wall, then at each object, then at each coupling and force.
 
     Args:
         record: the tick.
         timestamp: of its deadline [s].
-        contacts: walls and objects; None: the walls of the record.
+        contacts: walls, objects, couplings and forces; None: the walls of the record.
     """
     contacts = record.walls if contacts is None else contacts
     damping = [contact.damping_n_s_per_m for contact in contacts]

@@ -358,4 +358,5 @@ class RecordLayout:
             at += len(WALL)
         space = space_record(values[at:]) if near else None
         ports = self._ports.unpack(row, struct.size) if has_ports else None
-        return TickRecord(*values[:scalars], *vectors, tuple(wall_records), space, ports)
+        made = (*values[:scalars], *vectors, tuple(wall_records), space, ports)
+        return TickRecord(*made)

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import enum
-
 from hapticd.config.remote import PortLimits
+from hapticd.tick.remote.port_state import PortState
 from hapticd.tick.remote.update import RELEASED, Update
+
+__all__ = ["QUIET_S", "Port", "PortState"]
 
 QUIET_S = 1.0
 """A port that is let go and taken up again and again is told of once in this time [s]."""
-
-
-class PortState(enum.IntEnum):
-    """How a port stands with its client."""
-
-    IDLE = 0  # no client has said anything yet
-    HELD = 1  # in force
-    STALE = 2  # the client's word is too old, or the same for too long: let go
-    RELEASED = 3  # the client has let go
 
 
 _HELD, _STALE, _RELEASED = PortState.HELD, PortState.STALE, PortState.RELEASED

@@ -1,0 +1,65 @@
+"""A record of a tick with ports says of each how it stands, and comes back as it was packed."""
+
+from __future__ import annotations
+
+import pytest
+
+from hapticd.config.walls import MAX_WALLS
+from hapticd.telemetry.wire import Objects, damping_map, energy_map
+from hapticd.tick.record import RecordLayout, TickRecord
+from hapticd.tick.remote.port import PortState
+from tests.tick.remote.rig import COUPLING, FORCE_PORT, WALL, Rig
+
+BALL = '[[scene.objects]]\nname = "ball"\nshape = "sphere"\nradius_m = 0.03\nstiffness_n_per_m = 500.0\n'
+
+
+def recorded(rig: Rig) -> TickRecord:
+    layout = RecordLayout(len(rig.at), False, MAX_WALLS)
+    layout.serve(rig.tick)
+    area = memoryview(bytearray(b"\xa5" * layout.size))
+    layout.pack(area, 0, rig.tick, rig.sample, 7, 1000, 1.0, 2.0, 0, 1)
+    return layout.unpack(area)
+
+
+@pytest.mark.parametrize(
+    ("axes", "scene"), [("x", ""), ("xy", WALL), ("xyz", WALL), ("xyz", BALL + WALL), ("xyz", BALL)]
+)
+def test_it_says_how_each_port_stands(axes: str, scene: str) -> None:
+    rig = Rig(scene + COUPLING + FORCE_PORT, law="ring-damping", axes=axes)
+    rig.go([0.05] * len(axes))
+    for _ in range(200):
+        rig.say("tool", position_m=[0.051] * len(axes))
+        rig.go()
+    record = recorded(rig)
+    assert record.ports is not None
+    assert (record.ports.count, record.ports.objects) == (2, 0)
+    tool, field = record.ports.shown
+    port = rig["tool"]
+    assert (tool.index, tool.state, tool.seq) == (0, PortState.HELD, rig.seq)
+    assert tool.age_s == pytest.approx(1e-3)
+    assert tool.stiffness_n_per_m == 2000.0
+    assert tool.damping_n_s_per_m == max(channel.damping_n_s_per_m for channel in port.channels) > 0.0
+    assert list(tool.force_n) == port.force_n == pytest.approx([2.0] * len(axes), abs=1e-4)
+    assert list(tool.impulse_n_s) == port.impulse_n_s
+    assert list(tool.target_m) == pytest.approx([0.051] * len(axes))
+    assert tool.work_j == port.work_j == record.ports.work_j > 0.0
+    assert (field.index, field.state, field.seq, field.force_n) == (1, PortState.IDLE, -1, (0.0,) * len(axes))
+    assert len(record.walls) == scene.count("walls")
+    assert (record.space is not None) == ("objects" in scene)
+    totals = rig.tick.totals().ledger
+    assert (record.energy_j, record.spring_energy_j) == (totals.energy_j, totals.stored_j)
+    seen = damping_map(record, 0.0, Objects().see(record))
+    assert seen["in_contact"][-2:] == [True, False]
+    assert seen["damping_n_s_per_m"][-2:] == [tool.damping_n_s_per_m, 0.0]
+    assert len(seen["in_contact"]) == 2 + scene.count("[[")
+    energy = energy_map(record, 0.0)
+    balance = energy["spring_energy_j"] + energy["dissipated_j"] - energy["generated_j"] - energy["scene_work_j"]
+    assert energy["energy_j"] == pytest.approx(balance, abs=1e-12)
+
+
+def test_more_ports_than_a_record_has_room_for_leave_out_objects_and_never_a_coupling() -> None:
+    couplings = "".join(COUPLING.replace('"tool"', f'"{n}"') for n in range(16))
+    rig = Rig(couplings, axes="xyz")
+    record = recorded(rig)
+    assert record.ports is not None
+    assert [one.index for one in record.ports.shown] == list(range(16))
