@@ -15,7 +15,7 @@ from hapticd import plugins
 from hapticd.config.file import read
 from hapticd.config.models import Config
 from hapticd.config.objects import MeshObject
-from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig
+from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig, RemoteLawTable
 from hapticd.config.problems import Problems, nearest
 from hapticd.config.values import with_values
 from hapticd.driver import Driver, DriverOptions
@@ -42,6 +42,8 @@ class LoadedConfig:
         options: the driver's options.
         law: the law's module.
         params: the law's parameters.
+        port_law: the module of the law that couplings and forces are under.
+        port_params: that law's parameters.
         path: the file; what errors call it when it was no file.
         text: what the file said; `parse(text, str(path))` gives this configuration again in another process.
     """
@@ -51,6 +53,8 @@ class LoadedConfig:
     options: DriverOptions
     law: ModuleType
     params: LawParams
+    port_law: ModuleType
+    port_params: LawParams
     path: Path
     text: str
 
@@ -110,7 +114,8 @@ def parse(text: str, name: str) -> LoadedConfig:
     problems = Problems(name)
     config = problems.validated(Config, data)
     driver, options = _driver(problems, data)
-    law, params = _law(problems, data)
+    law, params = _law(problems, data, "controller", ControllerConfig().law)
+    port_law, port_params = _law(problems, data, "remote", RemoteLawTable().law)
     if config is not None:
         _check_together(problems, config)
         if driver is not None and options is not None:
@@ -118,9 +123,12 @@ def parse(text: str, name: str) -> LoadedConfig:
                 driver.check(options, config.loop.period_s)
             except ValueError as error:
                 problems.add(("device", "options"), str(error))
-    if problems.lines or config is None or driver is None or options is None or law is None or params is None:
+    if problems.lines or config is None or driver is None or options is None:
         raise ConfigError(*problems.lines)
-    return LoadedConfig(_with_files(config, Path(name).parent), driver, options, law, params, Path(name), text)
+    if law is None or params is None or port_law is None or port_params is None:
+        raise ConfigError(*problems.lines)
+    files = _with_files(config, Path(name).parent)
+    return LoadedConfig(files, driver, options, law, params, port_law, port_params, Path(name), text)
 
 
 def _toml(text: str, name: str) -> dict[str, Any]:
@@ -150,17 +158,18 @@ def _driver(problems: Problems, data: dict[str, Any]) -> tuple[type[Driver[Any]]
     return driver, _checked(problems, driver.Options, options, ("device", "options"))
 
 
-def _law(problems: Problems, data: dict[str, Any]) -> tuple[ModuleType | None, LawParams | None]:
-    controller = data.get("controller", {})
-    default = ControllerConfig().law
-    law = _plugin(problems, controller, ("controller", "law"), default, plugins.CONTROLLERS, plugins.law)
+def _law(
+    problems: Problems, data: dict[str, Any], table: str, default: str
+) -> tuple[ModuleType | None, LawParams | None]:
+    named = data.get(table, {})
+    law = _plugin(problems, named, (table, "law"), default, plugins.CONTROLLERS, plugins.law)
     if law is None:
         return None, None
-    params = controller.get("params", {})
+    params = named.get("params", {})
     if not isinstance(params, dict):  # already reported
         return law, None
     model: type[LawParams] = law.Params
-    return law, _checked(problems, model, params, ("controller", "params"))
+    return law, _checked(problems, model, params, (table, "params"))
 
 
 def _checked(problems: Problems, model: type[TableT], data: object, at: tuple[str, str]) -> TableT | None:

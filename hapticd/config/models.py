@@ -13,7 +13,7 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from hapticd.config.objects import MAX_OBJECTS, ObjectConfig, check_names
-from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig
+from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig, RemoteLawTable
 from hapticd.config.remote import MAX_PORTS, CouplingConfig, ForceConfig, check_ports
 from hapticd.config.safety import SafetyConfig
 from hapticd.config.walls import MAX_WALLS, WallConfig
@@ -133,6 +133,10 @@ class ControlConfig(Table):
         return _tcp_endpoint(endpoint, 9873)
 
 
+class RemoteConfig(RemoteLawTable):
+    """[remote]: what other programs drive in the scene."""
+
+
 class ServiceConfig(Table):
     """[service]: how the daemon deals with this file."""
 
@@ -158,6 +162,7 @@ class Config(Table):
     safety: SafetyConfig = Field(default_factory=SafetyConfig)
     telemetry: TelemetryConfig = Field(default_factory=TelemetryConfig)
     control: ControlConfig = Field(default_factory=ControlConfig)
+    remote: RemoteConfig = Field(default_factory=RemoteConfig)
     faults: FaultsConfig = Field(default_factory=FaultsConfig)
     service: ServiceConfig = Field(default_factory=ServiceConfig)
 

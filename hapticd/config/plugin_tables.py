@@ -1,4 +1,4 @@
-"""[device] and [controller]: each names a plug-in and holds what is its own to check."""
+"""[device], [controller] and [remote]: each names a plug-in and holds what is its own to check."""
 
 from __future__ import annotations
 
@@ -31,3 +31,15 @@ class ControllerConfig(Table):
         description="installed law or importable module, see `hapticd controllers`",
     )
     params: dict[str, Any] = Field(default_factory=dict, description="the law's own parameters")
+
+
+class RemoteLawTable(Table):
+    """What [remote] says of the law that couplings and forces are under."""
+
+    law: str = Field(
+        "energy-cycle",
+        min_length=1,
+        description="law of couplings and forces, installed or an importable module: what is late makes energy, which "
+        "that of [controller] need not look at (docs/remote.md)",
+    )
+    params: dict[str, Any] = Field(default_factory=dict, description="that law's own parameters")

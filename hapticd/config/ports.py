@@ -34,6 +34,7 @@ def port_limits(scene: SceneConfig) -> list[PortLimits]:
                 each.damping_n_s_per_m,
                 each.max_force_n,
                 each.max_speed_m_per_s,
+                driven=each.driven,
             )
             for each in scene.couplings
         ),

@@ -31,6 +31,11 @@ class CouplingConfig(Table):
         0.1, gt=0.0, le=10.0, description="how long a target is good; an older one is let go by a ramp [s]"
     )
     max_speed_m_per_s: float = Field(1.0, gt=0.0, le=10.0, description="how fast a target that jumps is followed [m/s]")
+    driven: bool = Field(
+        False,
+        description="true: a motor of the client's own moves the target, such as a path or a robot, and the law leaves "
+        "that work alone; false: the client's world gives back what it gets, and what it gives more is damped",
+    )
 
 
 class ForceConfig(Table):
@@ -64,6 +69,7 @@ class PortLimits:
         max_force_n: largest force on the device [N]; 0: an object has no limit but the guard's.
         max_speed_m_per_s: how fast it is followed [m/s]; 0: a force goes nowhere.
         unchanged_s: how long a force may stay the same [s]; 0: as long as it is sent.
+        driven: whether a motor of the client's own moves it.
     """
 
     name: str
@@ -74,6 +80,7 @@ class PortLimits:
     max_force_n: float
     max_speed_m_per_s: float
     unchanged_s: float = 0.0
+    driven: bool = False
 
 
 def check_ports(objects: Iterable[str], couplings: Sequence[CouplingConfig], forces: Sequence[ForceConfig]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from hapticd.config.loading import LoadedConfig
@@ -10,6 +11,7 @@ from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.guard import Guard
+from hapticd.tick.motion import Motion
 from hapticd.tick.remote.coupling import Coupling
 from hapticd.tick.remote.streamed_force import StreamedForce
 from hapticd.tick.space.tick import SpaceTick
@@ -33,15 +35,10 @@ def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
             lambda: RunningLaw(config.law, config.params),
             settings.loop.period_s,
             settings.safety.ramp_s,
-            make_port,
+            partial(_make_port, config),
         )
     except ConfigError as error:
         raise ConfigError(*(f"{config.path}: {problem}" for problem in error.problems)) from None
-
-
-def make_port(limits: PortLimits, *parts: Any) -> Coupling | StreamedForce:
-    """A coupling or a force, from the parts that a tick gives it."""
-    return (Coupling if limits.kind == "coupling" else StreamedForce)(limits, *parts)
 
 
 def place_device(config: LoadedConfig, driver: Any) -> None:
@@ -49,3 +46,12 @@ def place_device(config: LoadedConfig, driver: Any) -> None:
     walls = config.config.scene.walls
     if walls:
         driver.place(walls[0].position_m, 1 if walls[0].free_side == "positive" else -1)
+
+
+def _make_port(
+    config: LoadedConfig, limits: PortLimits, motion: Motion, resolution_m: float, ramp_s: float
+) -> Coupling | StreamedForce:
+    """A coupling or a force, under the law of [remote]."""
+    kind = Coupling if limits.kind == "coupling" else StreamedForce
+    law = RunningLaw(config.port_law, config.port_params)
+    return kind(limits, motion, law.another, resolution_m, config.config.loop.period_s, ramp_s)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
+from traceback import walk_tb
 from typing import TYPE_CHECKING
 
 from hapticd.config.models import SceneConfig, VelocityConfig
@@ -30,11 +31,11 @@ from hapticd.tick.scene import check_objects, compile_walls
 from hapticd.tick.space.books import Totals
 
 if TYPE_CHECKING:  # what a scene without couplings and forces never loads
-    from hapticd.tick.remote.one_port import OnePort
+    from hapticd.tick.remote.one_port import OnePort, PortAxis
 
-MakePort = Callable[[PortLimits, Motion, Callable[[], RunningLaw], float, float, float], "OnePort"]
-"""Makes a coupling or a force: its limits, where the device is, a fresh law, the device's resolution [m], the period
-[s], the duration of its ramps [s]."""
+MakePort = Callable[[PortLimits, Motion, float, float], "OnePort"]
+"""Makes a coupling or a force: its limits, where the device is, the device's resolution [m], the duration of its ramps
+[s]."""
 
 _IMPOSSIBLE = "the device reported a position that is not possible"
 _LOST = "the device does not know any more where it is"
@@ -108,9 +109,7 @@ class ControlTick:
         self._axes = range(axes)
         self._simulated = info.simulated
         self._make_port = make_port
-        self.couplings: list[OnePort] = [
-            self._port(port, make_law) for port in port_limits(scene) if port.kind != "object"
-        ]
+        self.couplings: list[OnePort] = [self._port(port) for port in port_limits(scene) if port.kind != "object"]
         self.leaving_ports: list[OnePort] = []
         self.past_ports = Totals()
         self._gather()
@@ -152,7 +151,7 @@ class ControlTick:
         if self._blind and sample.calibrated:
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
         self._stand()
-        self._start_laws([(contact, contact.law) for contact in self._under_law()])
+        self._start_laws([(contact, contact.law) for contact in (*self._under_law(), *self._axes_under_law())])
 
     def arm(self) -> bool:
         """Let forces through; a wall that is already pressed comes in by a ramp. False while latched.
@@ -164,7 +163,9 @@ class ControlTick:
             return True
         if self.guard.latched:
             return False
-        laws = self._start_laws([(contact, self.make_law()) for contact in self._under_law()])
+        fresh = [(contact, self.make_law()) for contact in self._under_law()]
+        fresh += [(axis, axis.make_law()) for axis in self._axes_under_law()]
+        laws = self._start_laws(fresh)
         self.guard.arm()
         self.fallback = False
         for contact, law in laws:
@@ -196,7 +197,8 @@ class ControlTick:
         It is made ready a slice at a time, and ticks may go on in between; what comes after the last takes it.
 
         A wall that did not change keeps its clock, law and books; one that changed in place keeps law and books; one
-        that is gone fades out. Another law is put on every wall, but not in the place of the fallback.
+        that is gone fades out. Another law is put on every wall, but not in the place of the fallback, and
+        not on couplings and forces, which have a law of their own.
 
         Raises:
             ConfigError: the scene or the limits do not fit the device; nothing has changed then.
@@ -212,12 +214,12 @@ class ControlTick:
             walls = compile_walls(scene.walls, self.info, self.period_s)
             yield
             there = yield from arrange(walls, self.contacts, self.info, make)
-            ports = yield from arrange_ports(scene, self.couplings, lambda limits: self._port(limits, make))
+            ports = yield from arrange_ports(scene, self.couplings, self._port)
         new: list[Contact] = [*there.new, *axes_of(ports.new)]
         laws = [(contact, contact.law) for contact in new]
         if make_law is not None:
-            for contact in [*there.contacts, *axes_of(ports.ports)]:
-                if contact not in new:
+            for contact in there.contacts:
+                if contact not in there.new:
                     laws.append((contact, make()))
                     yield
         gone = []
@@ -283,7 +285,8 @@ class ControlTick:
         """Put the damping fallback in the place of every law, and stop."""
         if not self.fallback:
             self.fallback = True
-            for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in self._under_law()]):
+            failing = (*self._under_law(), *self._axes_under_law())
+            for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in failing]):
                 self._take_law(contact, law)
         self.fail(code, text)
 
@@ -367,16 +370,15 @@ class ControlTick:
         return force_n
 
     def _under_law(self) -> list[Contact]:
-        return [
-            *self.contacts,
-            *axes_of(self.couplings),
-            *axes_of(self.leaving_ports),
-        ]  # all under a law of [controller]
+        return self.contacts  # all that have a law of [controller]
 
-    def _port(self, limits: PortLimits, make_law: Callable[[], RunningLaw]) -> OnePort:
+    def _axes_under_law(self) -> list[PortAxis]:
+        return axes_of([*self.couplings, *self.leaving_ports])  # all that have a law of [remote]
+
+    def _port(self, limits: PortLimits) -> OnePort:
         if self._make_port is None:
             raise ConfigError(f'"{limits.name}": this tick has no {limits.kind}s')
-        return self._make_port(limits, self.motion, make_law, self.info.resolution_m, self.period_s, self.ramp_s)
+        return self._make_port(limits, self.motion, self.info.resolution_m, self.ramp_s)
 
     def _take_ports(self, arrangement: PortArrangement) -> None:
         """Go on with other ports; of those that were gone before, the ones that have let go leave the books."""
@@ -431,7 +433,9 @@ class ControlTick:
             text = f"{type(error).__name__}: {error}"
         except Exception:  # noqa: BLE001 - an exception of anybody's making need not even be printable
             text = type(error).__name__
-        self.fail_law(EventCode.LAW_FAILED, f"law {contact.law.module.__name__}: {text}")
+        frames = {frame.f_globals.get("__name__") for frame, _ in walk_tb(error.__traceback__)}
+        failed = next((each for each in self._active if each.law.module.__name__ in frames), contact)
+        self.fail_law(EventCode.LAW_FAILED, f"law {failed.law.module.__name__}: {text}")
         for each in self._active:
             each.act(periods)
 

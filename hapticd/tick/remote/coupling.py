@@ -20,7 +20,10 @@ class Coupling(OnePort):
 
         f = -k (p - q) - b (v - dq/dt)      p the device, q the followed target; each term within the limit
 
-    It pulls as well as it pushes, so that its laws see a contact that is not lost while it is held.
+    It pulls as well as it pushes, so that its laws see a contact that is not lost while it is held. A law sees the
+    device's own motion: what the client gives back beyond what it got, since it is late, is energy that the law damps.
+    Of a target that is driven, by a motor of the client's, a law sees the motion of the device against the target
+    instead; the motor's work is none of its business.
 
     Args:
         limits: what it may do.
@@ -104,13 +107,20 @@ class Coupling(OnePort):
         limit_n = self.limit_n
         k = self.stiffness.force(stretch_m, limit_n) / stretch_m if stretch_m > LEAST_M else self.stiffness.now
         b = self.damping.force(speed_m_per_s, limit_n) / speed_m_per_s if speed_m_per_s > 0.0 else 0.0
+        driven = self.limits.driven
         for axis, channel in enumerate(self.channels):
             x = x_m[axis]
             if -LEAST_M < x < LEAST_M:
                 x = -LEAST_M
-            moved_m = motion.position_m[axis] - self._from_m[axis] - follower.moved_m[axis]
+            way_m = motion.position_m[axis] - self._from_m[axis]
+            against_m = way_m - follower.moved_m[axis]
             spring_n = -k * x
-            channel.see(1.0, x, moved_m, speeds[axis], dt_s, spring_n, spring_n - b * speeds[axis])
+            contact_n = spring_n - b * speeds[axis]
+            if driven:
+                channel.see(1.0, x, against_m, speeds[axis], dt_s, spring_n, contact_n)
+            else:
+                channel.see(1.0, x, way_m, motion.velocity_m_per_s[axis], dt_s, spring_n, contact_n)
+                channel.way_m = against_m  # by which the books go
 
     def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
         moved_m = self.follower.moved_m

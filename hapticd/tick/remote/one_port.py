@@ -88,7 +88,7 @@ class OnePort(Port):
         super().__init__(limits, axes)
         self.motion = motion
         self.books = PortBooks()
-        self.channels = [PortAxis(self, axis, make_law(), resolution_m) for axis in range(axes)]
+        self.channels = [PortAxis(self, axis, make_law, resolution_m) for axis in range(axes)]
         self.ramp_s = ramp_s
         self.most_n = self.limit_n = limits.max_force_n
         self.stiffness = Ramped(limits.stiffness_n_per_m)
@@ -317,18 +317,20 @@ class PortAxis(Channel):
     Args:
         port: it.
         axis: of the device.
-        law: the law of this axis.
+        make_law: a fresh law for it.
         resolution_m: smallest step of the device's position [m].
 
     Attributes:
+        make_law: the same.
         asked_n: what its law asks for, blended, before the port's own ramp and limit [N].
         own_n: the part of what is applied that is not the law's [N].
     """
 
-    __slots__ = ("_leads", "_port", "asked_n", "own_n")
+    __slots__ = ("_leads", "_port", "asked_n", "make_law", "own_n")
 
-    def __init__(self, port: OnePort, axis: int, law: RunningLaw, resolution_m: float) -> None:
-        super().__init__(law, resolution_m, port.books.ledger)
+    def __init__(self, port: OnePort, axis: int, make_law: Callable[[], RunningLaw], resolution_m: float) -> None:
+        super().__init__(make_law(), resolution_m, port.books.ledger)
+        self.make_law = make_law
         self.wall = Line(axis)  # type: ignore[assignment]  # stands for a wall, see there
         self.awake = False
         self.asked_n = self.own_n = 0.0

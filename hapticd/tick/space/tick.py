@@ -246,7 +246,7 @@ class SpaceTick(ControlTick):
         return force_n
 
     def _under_law(self) -> list[Contact]:
-        return [*super()._under_law(), *(channel for contact in self.solids for channel in contact.channels)]
+        return [*self.contacts, *(channel for contact in self.solids for channel in contact.channels)]
 
     def _stand(self) -> None:
         super()._stand()

@@ -147,7 +147,8 @@ class Rig:
         return max(abs(self.energy_j - became), abs(self.energy_j - ledger.energy_j))
 
     def _load(self, scene: str, law: str) -> LoadedConfig:
-        return parse(f'{scene}\n[controller]\nlaw = "{law}"\n[safety]\nramp_s = {RAMP_S}\n{self.safety}\n', "bench")
+        laws = f'[controller]\nlaw = "{law}"\n[remote]\nlaw = "{law}"\n'
+        return parse(f"{scene}\n{laws}[safety]\nramp_s = {RAMP_S}\n{self.safety}\n", "bench")
 
 
 class Hand:
