@@ -37,6 +37,10 @@ app = lazy_group(
             f"{_COMMANDS}.space:command",
             "Find what stiffness a device with three axes holds, by direction and place.",
         ),
+        "remote": (
+            f"{_COMMANDS}.remote:command",
+            "Press what late programs render, under every law, and say what stiffness they get.",
+        ),
         "extremes": (
             f"{_COMMANDS}.extremes:command",
             "Hold the model's arithmetic against exact answers, over many decades of every parameter.",

@@ -1,0 +1,81 @@
+"""`hapticd study remote`: what stiffness a late client gets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from hapticd.errors import ConfigError
+from hapticd_studies.grid.output import require_cluster, require_extra, require_folder, write
+
+_FILES = ("remote.csv", "remote.json", "remote.png")
+_MOST_CLIENTS = 1_000_000
+_QUICK_CLIENTS = 4
+
+
+def command(
+    clients: Annotated[int, typer.Option(help="How many random clients of each kind.")] = 500,
+    seed: Annotated[int, typer.Option(help="Of the clients; the same seed gives the same ones anywhere.")] = 1,
+    laws: Annotated[str, typer.Option(help="Laws to compare, as none,energy-cycle:window=1.")] = "",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A few clients and no ladder: about 20 s on one core.")
+    ] = False,
+    replay: Annotated[str | None, typer.Option(help="One client again, KIND:SEED:INDEX.")] = None,
+    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("remote"),
+    cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,
+) -> None:
+    """Press what other programs render, late and unevenly, and say what stiffness they get under each law.
+
+    Two kinds of client on the simulated omega7, in the daemon's own tick: a tool behind a coupling that is pressed on a
+    table, and a wall that is sent as a raw force. First a ladder of stiffness at four rates, with and without a delay;
+    then random clients of 30 to 1000 Hz with delay, jitter, loss and pauses, held against constant dampers. Writes a
+    picture, CSV and JSON. Interrupted, the same command goes on where it was.
+
+    Example: hapticd study remote --output remote    hapticd study remote --replay force:1:17
+    """
+    require_extra("study", "numpy", "numba", "matplotlib")
+    require_cluster(cluster)
+    if not 1 <= clients <= _MOST_CLIENTS:
+        raise ConfigError(f"--clients {clients}: must be from 1 to {_MOST_CLIENTS}")
+    if not 0 <= seed < 10**18:
+        raise ConfigError(f"--seed {seed}: must be 0 or more and less than 1e18")
+
+    from hapticd_studies.law_spec import parse_laws
+    from hapticd_studies.remote.sweep import DAMPERS, LAWS, RemotePlan
+
+    chosen, dampers = parse_laws(laws or LAWS, {}), parse_laws(",".join(DAMPERS), {})
+    console = Console(highlight=False)
+    if replay is not None:
+        from hapticd_studies.remote.replay import case_of, figures
+
+        case = case_of(replay)
+        for line in case.words():
+            console.print(line, markup=False)
+        console.print(figures(case, [*chosen, *dampers]))
+        return
+
+    from hapticd_studies.grid.run import kept, run
+    from hapticd_studies.remote.plot import draw
+    from hapticd_studies.remote.report import LADDER_WORDS, RANDOM_WORDS, report
+
+    require_folder(output, _FILES)
+    plan = RemotePlan(seed, min(clients, _QUICK_CLIENTS) if quick else clients, chosen, dampers, ladder=not quick)
+    Console(stderr=True, highlight=False).print(f"{len(plan.cells)} runs", soft_wrap=True)
+    job = plan.job()
+    with kept(job, output / "remote.journal", fresh) as journal:
+        found = report(plan, plan.table(run(job, journal, "remote", cluster)))
+        for file, content in zip(_FILES, (found.csv(), found.json(), draw(found)), strict=True):
+            write(output / file, content)
+    if as_json:
+        typer.echo((output / "remote.json").read_text(), nl=False)
+        return
+    if found.reaches:
+        console.print("[bold]Stiffness that is felt [N/m][/]", found.ladder(), LADDER_WORDS, "", sep="\n")
+    console.print("[bold]Random clients[/]", found.random(), RANDOM_WORDS, sep="\n")
+    console.print(f"\nOne again: hapticd study remote --replay force:{seed}:0", soft_wrap=True)
+    console.print(f"{output}: {', '.join(_FILES)}", soft_wrap=True, markup=False)

@@ -1,0 +1,215 @@
+"""One client on the simulated omega7 under a law: the daemon's own tick, and what became of the press."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import deque
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.offline.felt import WINDOW_S, felt_index
+from hapticd.offline.outcome import Balance, Criterion, Outcome
+from hapticd.offline.rehearsal import Rehearsal
+from hapticd.tick.remote.update import Update
+from hapticd_studies.law_spec import LawSpec
+from hapticd_studies.remote.clients import Client, FeltWall, Seen, TamedWall, Tool
+from hapticd_studies.remote.network import Network, turns
+
+DURATION_S = 4.0
+MAX_FORCE_N = 12.0
+
+COLUMNS = ("outcome", "span_m", "mean_m", "felt", "peak_force_n", "largest_step_n")
+"""Of a run, in the order of its row; `largest_step_n`: of the applied force from one tick to the next."""
+
+_CONFIG = """
+[device.options]
+model = "omega7"
+hand.force = {{ profile = "constant", newton = {press_n!r} }}
+hand.mass_kg = {hand_kg!r}
+hand.damping_n_s_per_m = {hand_n_s_per_m!r}
+hand.stiffness_n_per_m = {hand_n_per_m!r}
+[[scene.{port}]]
+name = "client"
+max_force_n = 12.0
+{more}
+[controller]
+law = "none"
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One client, how it is heard, and the hand that presses it.
+
+    Attributes:
+        name: SEED:INDEX, or what it is for.
+        kind: `tool`: a body behind a coupling, on a table; `force`: a wall as a raw force; `tamed`: the same, tuned by
+            hand.
+        stiffness_n_per_m: of the coupling or the wall [N/m].
+        network: how it is heard.
+        press_n: how hard the hand presses [N].
+        tool_kg: mass of the body behind the coupling [kg].
+        table_n_per_m: stiffness of what that lies on [N/m].
+        hand_kg, hand_n_s_per_m, hand_n_per_m: what of the hand moves with the device.
+        seed: of everything random.
+    """
+
+    name: str
+    kind: str
+    stiffness_n_per_m: float
+    network: Network
+    press_n: float = 3.0
+    tool_kg: float = 0.2
+    table_n_per_m: float = 5000.0
+    hand_kg: float = 0.05
+    hand_n_s_per_m: float = 1.0
+    hand_n_per_m: float = 100.0
+    seed: int = 1
+
+    def client(self) -> Client:
+        """The program itself, from its beginning."""
+        if self.kind == "tool":
+            return Tool(self.tool_kg, self.table_n_per_m, self.stiffness_n_per_m)
+        return (TamedWall if self.kind == "tamed" else FeltWall)(self.stiffness_n_per_m)
+
+    def config(self, law: LawSpec) -> LoadedConfig:
+        """The daemon's configuration for it."""
+        coupling = f"stiffness_n_per_m = {self.stiffness_n_per_m!r}\ndamping_n_s_per_m = 2.0\nhold_s = 0.25"
+        loaded = _parsed(
+            _CONFIG.format(
+                press_n=-self.press_n,
+                hand_kg=self.hand_kg,
+                hand_n_s_per_m=self.hand_n_s_per_m,
+                hand_n_per_m=self.hand_n_per_m,
+                port="couplings" if self.kind == "tool" else "forces",
+                more=coupling if self.kind == "tool" else "hold_s = 0.25\nunchanged_s = 0.0",
+            )
+        )
+        return loaded.with_values({"remote.law": law.name, "remote.params": dict(law.values)})
+
+    def words(self) -> list[str]:
+        """All that it is, a line a thing, for people."""
+        found = asdict(self)
+        found |= found.pop("network")
+        return [f"{name} = {value}" for name, value in found.items()]
+
+    def balance(self) -> Balance:
+        """Where the hand's force and all springs balance."""
+        total = self.client().stiffness_n_per_m + self.hand_n_per_m
+        return Balance(-self.press_n / total, total)
+
+
+def run(case: Case, law: LawSpec, take: Callable[[Rehearsal], object] | None = None) -> list[float]:
+    """Run a case under a law, and say what became of it, in the order of `COLUMNS`.
+
+    Args:
+        case: the client, its network, the hand.
+        law: on its port.
+        take: is shown the daemon's tick and the device after every tick.
+    """
+    rehearsal = Rehearsal(case.config(law))
+    period_s = rehearsal.period_s
+    ticks = round(DURATION_S / period_s)
+    port = rehearsal.tick.ports[0]
+    client = case.client()
+    update = Update()
+    inbox: deque[tuple[float, int, Update]] = deque()
+    coming = turns(case.network, DURATION_S, case.seed)
+    turn = next(coming, None)
+    before_s = -1.0 / case.network.rate_hz
+    newest = -1
+    known: list[Seen] = []
+    true_m: list[float] = []
+    peak_n = step_n = last_n = 0.0
+    for count in rehearsal.run(ticks):
+        now_s = (count + 1) * period_s
+        known.append(Seen(rehearsal.tick.motion.position_m[0], port.impulse_n_s[0]))
+        while turn is not None and turn.at_s < now_s:
+            seen = known[min(count, int(turn.sees_s / period_s))]
+            client.step(turn.at_s - before_s, seen, update)
+            update.seq += 1
+            before_s = turn.at_s
+            if turn.heard_s is not None:
+                inbox.append((turn.heard_s, update.seq, _copy(update)))
+            turn = next(coming, None)
+        heard = [one for one in inbox if one[0] < now_s]
+        if heard:
+            latest = max(heard, key=lambda one: one[1])
+            inbox = deque(one for one in inbox if one[0] >= now_s)
+            if latest[1] > newest:
+                newest = latest[1]
+                port.take(latest[2])
+        force_n = rehearsal.tick.force_n[0]
+        peak_n = max(peak_n, abs(force_n))
+        step_n = max(step_n, abs(force_n - last_n))
+        last_n = force_n
+        true_m.append(rehearsal.model.x_m)
+        if take is not None:
+            take(rehearsal)
+    return [*_ended(case, rehearsal, np.array(true_m)), peak_n, step_n]
+
+
+def draw(seed: int, index: int, kind: str) -> Case:
+    """One of the random clients."""
+    random_ = random.Random(f"{seed}:{index}:{kind}")
+
+    def between(low: float, high: float) -> float:
+        return math.exp(random_.uniform(math.log(low), math.log(high)))
+
+    paused = random_.random() < 0.25
+    network = Network(
+        rate_hz=between(30.0, 1000.0),
+        delay_s=random_.choice((0.0, between(1e-3, 0.05))),
+        jitter_s=random_.choice((0.0, between(1e-4, 0.02))),
+        loss=random_.choice((0.0, random_.uniform(0.0, 0.3))),
+        burst=random_.choice((1.0, random_.uniform(1.0, 5.0))),
+        pause_at_s=1.5 if paused else 0.0,
+        pause_s=between(0.05, 1.0) if paused else 0.0,
+    )
+    return Case(
+        name=f"{seed}:{index}",
+        kind=kind,
+        stiffness_n_per_m=between(50.0, 8000.0),
+        network=network,
+        press_n=random_.uniform(1.0, 6.0),
+        tool_kg=between(0.05, 1.0),
+        table_n_per_m=between(500.0, 10000.0),
+        hand_kg=random_.uniform(0.0, 0.1),
+        hand_n_s_per_m=random_.uniform(0.3, 1.5),
+        hand_n_per_m=random_.uniform(40.0, 200.0),
+        seed=random_.randrange(1 << 30),
+    )
+
+
+@lru_cache(maxsize=64)
+def _parsed(text: str) -> LoadedConfig:
+    return parse(text, "client")
+
+
+def _copy(update: Update) -> Update:
+    copy = Update()
+    copy.said, copy.seq = update.said, update.seq
+    copy.position_m[:] = update.position_m
+    copy.velocity_m_per_s[:] = update.velocity_m_per_s
+    copy.force_n[:] = update.force_n
+    return copy
+
+
+def _ended(case: Case, rehearsal: Rehearsal, true_m: Any) -> list[float]:
+    criterion = Criterion()
+    last = round(criterion.window_s / rehearsal.period_s)
+    if rehearsal.diverged:
+        return [float(Outcome.DIVERGED), math.inf, math.nan, math.inf]
+    ended = true_m[-last:]
+    span_m, mean_m = float(np.ptp(ended)), float(np.mean(ended))
+    felt = felt_index(true_m[-round(WINDOW_S / rehearsal.period_s) :], rehearsal.period_s)
+    if rehearsal.fault is not None:
+        return [float(Outcome.STOPPED), span_m, mean_m, felt]
+    outcome = criterion.outcome(rehearsal.model.options, case.balance(), span_m, mean_m)
+    return [float(outcome), span_m, mean_m, felt]

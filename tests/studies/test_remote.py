@@ -1,0 +1,158 @@
+"""`hapticd study remote`: clients that are late, uneven and lossy, in the daemon's own tick."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticd.cli import main
+from hapticd.offline.outcome import Outcome
+from hapticd.tick.remote.update import Update
+from hapticd_studies.law_spec import parse_laws
+from hapticd_studies.remote.clients import FeltWall, Seen, TamedWall, Tool
+from hapticd_studies.remote.network import Network, turns
+from hapticd_studies.remote.runs import COLUMNS, Case, draw, run
+
+NETWORKS = st.builds(
+    Network,
+    rate_hz=st.floats(30.0, 1000.0),
+    delay_s=st.floats(0.0, 0.05),
+    jitter_s=st.floats(0.0, 0.02),
+    loss=st.floats(0.0, 0.5),
+    burst=st.floats(1.0, 5.0),
+    pause_at_s=st.floats(0.0, 1.0),
+    pause_s=st.floats(0.0, 1.0),
+)
+
+
+def became(case: Case, law: str) -> dict[str, float]:
+    return dict(zip(COLUMNS, run(case, parse_laws(law, {})[0]), strict=True))
+
+
+def settled(case: Case, law: str) -> bool:
+    return became(case, law)["outcome"] == Outcome.SETTLED
+
+
+# -- the network
+
+
+@given(network=NETWORKS, seed=st.integers(0, 1 << 30))
+def test_a_client_sees_no_future_and_unlearns_nothing(network: Network, seed: int) -> None:
+    sees_s = 0.0
+    for turn in turns(network, 2.0, seed):
+        assert sees_s <= turn.sees_s <= max(turn.at_s - network.delay_s, sees_s)
+        sees_s = turn.sees_s
+        assert turn.heard_s is None or turn.at_s + network.delay_s <= turn.heard_s
+        assert not network.pause_at_s <= turn.at_s < network.pause_at_s + network.pause_s
+
+
+@pytest.mark.parametrize("burst", [1.0, 4.0])
+def test_as_many_messages_are_lost_as_was_said_and_in_rows_as_long(burst: float) -> None:
+    lost = [turn.heard_s is None for turn in turns(Network(1000.0, loss=0.2, burst=burst), 100.0, 3)]
+    rows = sum(now and not before for before, now in pairwise(lost))
+    assert sum(lost) / len(lost) == pytest.approx(0.2, rel=0.1)
+    assert sum(lost) / rows == pytest.approx(burst, rel=0.15)
+
+
+def test_jitter_beyond_a_period_makes_messages_overtake_each_other() -> None:
+    heard = [turn.heard_s for turn in turns(Network(500.0, jitter_s=0.02), 1.0, 1) if turn.heard_s is not None]
+    assert heard != sorted(heard)
+
+
+# -- the clients
+
+
+def test_a_tool_comes_to_lie_where_table_and_push_balance() -> None:
+    """Pushed with a constant 3 N it ends 3 N / k deep, whatever it weighs and however seldom it steps."""
+    tool, update = Tool(0.2, 5000.0, 1000.0), Update()
+    for count in range(1, 400):
+        tool.step(0.01, Seen(0.0, 3.0 * 0.01 * count), update)
+    assert update.position_m[0] == pytest.approx(-3.0 / 5000.0, rel=1e-3)
+
+
+def test_a_tuned_wall_ends_at_a_fifth_and_rises_no_faster_than_it_may() -> None:
+    wall, update = TamedWall(1000.0), Update()
+    before_n = 0.0
+    for _ in range(1000):
+        wall.step(0.01, Seen(-4e-3, 0.0), update)
+        assert abs(update.force_n[0] - before_n) <= TamedWall.SLEW_N_PER_S * 0.01 + 1e-12
+        before_n = update.force_n[0]
+    assert before_n == pytest.approx(0.2 * 1000.0 * 4e-3, rel=1e-6)
+    FeltWall(1000.0).step(0.01, Seen(-4e-3, 0.0), update)
+    assert update.force_n[0] == 4.0
+
+
+# -- the loop around them
+
+
+def test_a_wall_from_a_client_is_held_as_far_as_theory_says() -> None:
+    """Without a law b / (N T / 2 + L): the hold of a client's period and the way there and back."""
+    network = Network(200.0, delay_s=0.005)
+    b_n_s_per_m = 4.4 + 1.0
+    limit_n_per_m = b_n_s_per_m / (0.5 * 0.005 + 0.010 + 0.5e-3)
+    assert settled(Case("below", "force", 0.7 * limit_n_per_m, network), "none")
+    above = became(Case("above", "force", 1.5 * limit_n_per_m, network), "none")
+    assert above["outcome"] == Outcome.MOVING
+    assert above["span_m"] > 1e-3
+
+
+@pytest.mark.parametrize("kind", ["tool", "force"])
+def test_the_law_of_a_port_holds_what_no_law_and_no_wall_law_does(kind: str) -> None:
+    """At 60 Hz and 10 ms each way a spring of 3.2 kN/m swings by centimetres; with the law it rests in its place."""
+    case = Case("late", kind, 3200.0, Network(60.0, delay_s=0.01))
+    assert became(case, "none")["span_m"] > 0.01
+    rested = became(case, "energy-cycle")
+    assert rested["outcome"] == Outcome.SETTLED
+    assert rested["peak_force_n"] <= 12.0
+
+
+def test_a_client_that_pauses_is_let_go_and_comes_back_to_its_place() -> None:
+    network = Network(200.0, delay_s=0.005, pause_at_s=1.5, pause_s=0.6)
+    rested = became(Case("paused", "force", 400.0, network), "energy-cycle")
+    assert rested["outcome"] == Outcome.SETTLED
+
+
+def test_a_random_client_is_the_same_anywhere_and_none_is_like_another() -> None:
+    assert draw(7, 3, "tool") == draw(7, 3, "tool")
+    assert len({draw(7, index, kind) for index in range(50) for kind in ("tool", "force")}) == 100
+
+
+# -- the command
+
+
+def remote(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as left:
+        main(["study", "remote", *arguments])
+    return int(left.value.code or 0)
+
+
+def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert remote("--clients", "1", "--quick", "--laws", "none,energy-cycle", "--output", str(tmp_path)) == 0
+    found = json.loads((tmp_path / "remote.json").read_text())
+    assert {one["kind"] for one in found["random"]} == {"tool", "force"}
+    assert all(one["largest_force_n"] <= 12.0 for one in found["random"])
+    lines = (tmp_path / "remote.csv").read_text().splitlines()
+    assert len(lines) == 1 + 2 * (2 + 5)
+    assert (tmp_path / "remote.png").read_bytes().startswith(b"\x89PNG")
+    assert not (tmp_path / "remote.journal").exists()
+    assert "Random clients" in capsys.readouterr().out
+
+
+def test_one_client_again_says_what_it_is_and_what_becomes_of_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert remote("--replay", "force:1:0", "--laws", "none") == 0
+    said = capsys.readouterr().out
+    case = draw(1, 0, "force")
+    assert f"rate_hz = {case.network.rate_hz}" in said
+    assert "none" in said
+    assert "damper:100" in said
+
+
+@pytest.mark.parametrize("arguments", [("--clients", "0"), ("--replay", "wall:1:2"), ("--laws", "no-such")])
+def test_what_makes_no_sense_is_one_line(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    assert remote(*arguments) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
