@@ -44,6 +44,9 @@ EQUAL: dict[str, tuple[str, ...]] = {
     "no clock and no sum of measured places comes to it exactly": (
         "drivers/hapticd_drivers/rig/conversation.py: Conversation.await_state: if left_ns <= 0:  [LtE 0 is Lt]",
         "drivers/hapticd_drivers/rig/motion.py: _go: if now.time_s - start.time_s > longest_s:  [Gt 0 is GtE]",
+        "drivers/hapticd_drivers/rig/motion.py: _nudge: if abs(now.position_m - start.position_m) >= enough_m:  "
+        "[GtE 0 is Gt]",
+        "drivers/hapticd_drivers/rig/motion.py: _go: if gone_m > best_m + 2.0 * drive.count_m:  [Gt 0 is GtE]",
         "drivers/hapticd_drivers/rig/motion.py: _settled: if abs(now.position_m - since.position_m) > still_m:  "
         "[Gt 0 is GtE]",
         "hapticd/supervisor/recovery.py: HotplugWatch.news: if now_s < self._due_s:  [Lt 0 is LtE]",

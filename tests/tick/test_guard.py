@@ -43,6 +43,15 @@ def test_nothing_passes_until_it_is_armed() -> None:
     assert force_n == [0.0, 0.0, 0.0]
 
 
+def test_nothing_is_limited_before_the_first_force_nor_after_the_last() -> None:
+    assert not guard().limited
+    made = armed()
+    made.reduce([100.0], PERIOD_S)
+    assert made.limited
+    made.drop()
+    assert not made.limited
+
+
 @given(force_n=FORCES, max_axis_n=st.none() | st.floats(0.1, 12.0))
 def test_no_force_is_beyond_a_limit_and_its_direction_is_kept(force_n: list[float], max_axis_n: float | None) -> None:
     made = armed(max_axis_force_n=max_axis_n)

@@ -148,3 +148,18 @@ def test_a_device_with_one_axis_takes_no_object_over() -> None:
     with pytest.raises(ConfigError, match="objects need three axes, and bench has 1"):
         list(tick.switch(scene))
     assert len(tick.contacts) == 1
+
+
+def test_what_fades_out_has_no_force_of_its_own_and_is_dropped_when_it_is_gone() -> None:
+    """The device goes on inwards at 0.3 m/s: what is left is the old force alone, a share less each tick."""
+    rig = pressed()
+    old_n = rig.force[2]
+    rig.switch("")
+    assert len(rig.tick.awake) == 1
+    for count in range(RAMP_TICKS):
+        rig.go((0.0, 0.0, 0.0292 - 3e-4 * (count + 1)))
+        assert rig.force[2] == pytest.approx(old_n * (1.0 - count / RAMP_TICKS), rel=1e-6)
+    rig.go((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert rig.force == (0.0, 0.0, 0.0)
+    assert rig.tick.awake == []
+    assert rig.unbalanced_j() < 1e-12
