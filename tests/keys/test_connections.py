@@ -6,6 +6,8 @@ import contextlib
 import os
 import resource
 import socket as sockets
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -141,3 +143,11 @@ def ended(connection: sockets.socket) -> bool:
     except ConnectionError:
         return True
     return True
+
+
+def test_a_program_that_ends_without_closing_the_bound_ends() -> None:
+    program = (
+        "import zmq; from hapticd.keys.connections import ConnectionBound as B; c = zmq.Context(); b = B(c.socket(6))"
+    )
+    assert zmq.ROUTER == 6
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60.0)

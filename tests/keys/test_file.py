@@ -160,3 +160,32 @@ def test_a_secret_is_not_shown_by_accident() -> None:
     pair = new_pair()
     assert pair.secret not in repr(pair)
     assert pair.public in repr(pair)
+
+
+def test_a_key_file_has_at_most_16_kib(tmp_path: Path) -> None:
+    file = tmp_path / "a.key"
+    write(file, new_pair())
+    text = file.read_text()
+    file.write_text(text + "#" * (16384 - len(text)))
+    assert read(file).public in text
+    file.write_text(text + "#" * (16385 - len(text)))
+    with pytest.raises(ConfigError, match="is larger than 16 KiB"):
+        read(file)
+
+
+def test_a_name_that_no_file_can_have_cannot_be_read() -> None:
+    with pytest.raises(ConfigError, match="cannot be read: embedded null byte"):
+        read(Path("a\0b"))
+
+
+def test_a_key_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A computer that loses its power leaves the whole file or none."""
+    sizes = []
+
+    def sync(descriptor: int) -> None:
+        sizes.append(os.fstat(descriptor).st_size)
+        assert not (tmp_path / "a.key").exists()
+
+    monkeypatch.setattr(os, "fsync", sync)
+    write(tmp_path / "a.key", new_pair())
+    assert sizes == [(tmp_path / "a.key").stat().st_size]

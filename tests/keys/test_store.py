@@ -10,9 +10,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from hapticd.config.loading import parse
 from hapticd.errors import ConfigError
 from hapticd.keys import store
 from hapticd.keys.file import Key, KeyWriteError, new_pair
+from hapticd.keys.policy import key_ring
 from hapticd.keys.store import KeyDirectory, KeyRing, key_directory
 
 
@@ -152,3 +154,13 @@ def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(KeyWriteError, match=f"{tmp_path}/file/keys: Not a directory"):
         KeyDirectory(tmp_path / "file" / "keys").make()
+
+
+def test_a_daemon_that_no_other_computer_reaches_needs_no_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its measurements stay here; commands over a port take keys on this computer too."""
+    monkeypatch.setenv("HAPTICD_KEYS_DIR", str(tmp_path))
+    assert key_ring(parse("[telemetry]\ntcp = 'tcp://127.0.0.1:9872'\n", "lab")) is None
+    assert key_ring(parse("", "lab")) is None
+    for table, address in (("telemetry", "0.0.0.0"), ("control", "127.0.0.1")):
+        with pytest.raises(ConfigError, match=f"{table}.tcp = .*: takes keys, and there are none in"):
+            key_ring(parse(f"[{table}]\ntcp = 'tcp://{address}:9872'\n", "lab"))
