@@ -254,3 +254,33 @@ def test_whatever_a_listed_client_sends_is_answered(frames: list[bytes]) -> None
         commander.socket.send_multipart(frames)
         endpoints.turn_until(lambda: bool(commander.socket.poll(0)), "an answer")
         assert set(msgpack.unpackb(commander.socket.recv())) >= {"ok", "text"}
+
+
+def test_a_port_that_does_not_come_free_is_told_of_once_after_two_hundred_tries(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """T6: ZeroMQ lets go of it a moment later, so that the first tries mean nothing."""
+    context = zmq.Context()
+    socket = context.socket(zmq.XPUB)
+    made = server.CurveServer(socket, "tcp://127.0.0.1:0", SERVER, frozenset({LAPTOP.public}))
+
+    def busy() -> None:
+        raise zmq.ZMQError(zmq.EADDRINUSE)
+
+    def told(turns: int) -> int:
+        caplog.clear()
+        for _ in range(turns):
+            made.turn()
+        return len([record for record in caplog.records if "no client comes in there" in record.message])
+
+    try:
+        for _ in range(2):  # once more when it has been free in between
+            with monkeypatch.context() as patched:
+                patched.setattr(made, "_bind", busy)
+                made.renew(new_pair(), frozenset())
+                assert [told(199), told(1), told(300)] == [0, 1, 0]
+            made.turn()
+    finally:
+        socket.close(0)
+        made.close()
+        context.term()

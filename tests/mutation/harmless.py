@@ -7,6 +7,9 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 0 is Lt]",
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 1 is Lt]",
         "hapticd/tick/guard.py: let_out: return gain if gain * ramp_s >= dt_s * (1.0 - 1e-06) else 0.0  [GtE 0 is Gt]",
+        "hapticd/tick/guard.py: Guard.reduce: if newton > max_axis_n or newton < -max_axis_n:  [Gt 0 is GtE]",
+        "hapticd/tick/guard.py: Guard.reduce: if newton > max_axis_n or newton < -max_axis_n:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/input_to_state.py: step: if contact_m < 0.0:  [Lt 0 is LtE]",
         "controllers/hapticd_controllers/virtual_coupling.py: step: if proxy_m < 0.0:  [Lt 0 is LtE]",
         "hapticd/tick/guard.py: blended: if weight >= 1.0:  [GtE 0 is Gt]",
         "hapticd/tick/guard.py: blended: weight: float = done / state.blend_ticks if done > 0.0 else 0.0  "

@@ -250,6 +250,26 @@ def test_a_completed_cycle_is_entered_with_energy_generation_damping_and_duratio
     assert ledger.cycle_duration_s == pytest.approx(6e-3)
 
 
+def test_the_second_cycle_of_a_touch_lasts_from_the_end_of_the_first() -> None:
+    world = Spring(12000.0)
+    durations_s = []
+    for x_m in [-1e-3, -2e-3, -3e-3, -2e-3, -1e-3, -2e-3, -3e-3, -2e-3, -1e-3, 1e-3]:
+        before = world.ledger.cycle
+        world.move(x_m)
+        if world.ledger.cycle > before:
+            durations_s.append(world.ledger.cycle_duration_s)
+    assert sum(durations_s) == pytest.approx(10e-3)
+    assert len(durations_s) == 2
+
+
+def test_where_a_ledger_begins_is_no_fall() -> None:
+    """It falls once and rises twice from its first sample on, which is inside: that is no cycle."""
+    ledger = EnergyLedger()
+    for taken_j in (0.0, -1e-3, 1e-3, 1e-3):
+        ledger.update(taken_j, -1.0, 0.0, 0.0, True, 0.0, 1e-3)
+    assert ledger.cycle == 0
+
+
 def test_the_generated_energy_of_cycles_adds_up_to_the_energy_at_the_last_minimum() -> None:
     world = Spring(9000.0)
     made_j = []

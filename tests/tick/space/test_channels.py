@@ -30,6 +30,7 @@ def test_a_device_that_says_the_same_once_more_is_pushed_as_before() -> None:
     force, energy_j = rig.force, rig.totals.ledger.energy_j
     assert force[0] > 0.5
     assert force[2] > 3.0
+    assert rig.unbalanced_j() < 1e-12
     for _ in range(5):
         rig.tick.advance(rig.sample, PERIOD_S)
         assert tuple(rig.tick.force_n) == force
@@ -128,4 +129,7 @@ def test_a_law_that_keeps_time_is_asked_for_half_a_second_after_the_touch_and_no
 def test_a_start_beside_an_object_is_as_far_from_it_as_the_device_is() -> None:
     at = (0.012, 0.005, 0.034)
     rig = Rig(ball(position_m=(0.01, 0.0, 0.0))).start(at)
-    assert rig.tick.solids[0].solid.proxy.d == pytest.approx(apart(at, (0.01, 0.0, 0.0)) - 0.03, abs=1e-9)
+    free_m = pytest.approx(apart(at, (0.01, 0.0, 0.0)) - 0.03, abs=1e-9)
+    assert rig.tick.solids[0].solid.proxy.d == free_m
+    rig.go((0.3, -0.2, 0.4), (0.3, -0.2, 0.4), at)  # and once more where it comes back from afar
+    assert rig.tick.solids[0].solid.proxy.d == free_m
