@@ -13,6 +13,7 @@ from hapticd.tick.contact import RunningLaw
 from hapticd.tick.guard import Guard
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.coupling import Coupling
+from hapticd.tick.remote.remote_object import RemoteContact
 from hapticd.tick.remote.streamed_force import StreamedForce
 from hapticd.tick.space.tick import SpaceTick
 from hapticd.tick.tick import ControlTick
@@ -26,8 +27,7 @@ def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
     """
     settings = config.config
     try:
-        kind = SpaceTick if len(info.axes) == 3 else ControlTick
-        return kind(
+        parts = (
             settings.scene,
             settings.velocity,
             Guard(settings.safety, info),
@@ -37,6 +37,7 @@ def make_tick(config: LoadedConfig, info: DeviceInfo) -> ControlTick:
             settings.safety.ramp_s,
             partial(_make_port, config),
         )
+        return SpaceTick(*parts, RemoteContact) if len(info.axes) == 3 else ControlTick(*parts)
     except ConfigError as error:
         raise ConfigError(*(f"{config.path}: {problem}" for problem in error.problems)) from None
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import exp, sqrt
 
-from hapticd.tick.motion import MOST_M
+MOST_M = 1e7
+"""No target is farther away than any device can be [m]."""
 
 HASTE_PER_S = 400.0
 """How fast what is left of an update is made up for: to 9 % in 10 ms. A target whose velocity is said has no lag."""

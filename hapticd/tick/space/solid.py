@@ -8,7 +8,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from hapticd.config.objects import BoxObject, CapsuleObject, CylinderObject, MeshObject, ObjectConfig, SphereObject
+from hapticd.config.objects import (
+    MAX_SPEED_M_PER_S,
+    BoxObject,
+    CapsuleObject,
+    CylinderObject,
+    MeshObject,
+    ObjectConfig,
+    SphereObject,
+)
 from hapticd.errors import ConfigError
 from hapticd.shapes.field import Field
 from hapticd.shapes.pose import Pose
@@ -38,6 +46,7 @@ class Solid:
         proxy: the point on its surface that pulls the device back; it keeps its own state.
         stiffness_n_per_m, damping_n_s_per_m: in force now.
         rough: whether it has friction.
+        remote: whether a client moves it.
 
     Raises:
         ConfigError: a shape that is not possible.
@@ -50,6 +59,7 @@ class Solid:
         "name",
         "placed",
         "proxy",
+        "remote",
         "rough",
         "stiffness_n_per_m",
     )
@@ -60,7 +70,11 @@ class Solid:
         self.index = index
         self.configs = tuple(configs)
         self.placed = [placed(config) for config in configs]
-        margin_m = FASTEST_M_PER_S * period_s
+        self.remote = first.remote
+        fastest_m_per_s = FASTEST_M_PER_S
+        if first.remote:
+            fastest_m_per_s += MAX_SPEED_M_PER_S if first.max_speed_m_per_s is None else first.max_speed_m_per_s
+        margin_m = fastest_m_per_s * period_s
         self.proxy = Proxy(self.placed, first.static_friction, first.dynamic_friction, margin_m)
         self.stiffness_n_per_m = first.stiffness_n_per_m
         self.damping_n_s_per_m = first.damping_n_s_per_m
@@ -158,7 +172,10 @@ def compile_objects(objects: Sequence[ObjectConfig], period_s: float) -> list[So
             shapes.append(placed(config))
         except ConfigError as error:
             raise ConfigError(f'scene.objects[{index}] "{config.name}": {error}') from None
-    surfaces = [tuple(getattr(config, key) for key in _SURFACE) for config in objects]
+    # What a client moves is no part of another solid.
+    surfaces = [
+        (*(getattr(config, key) for key in _SURFACE), config.name if config.remote else "") for config in objects
+    ]
     return [
         Solid([objects[at] for at in members], members[0], period_s)
         for members in sorted(group(shapes, surfaces), key=lambda members: members[0])
@@ -167,7 +184,10 @@ def compile_objects(objects: Sequence[ObjectConfig], period_s: float) -> list[So
 
 def _without_place(configs: Sequence[ObjectConfig]) -> list[dict[str, Any]]:
     """What tables say but for the place of the first: of the others it counts, as they are seen from there."""
-    skip = ("position_m", "orientation", "stiffness_n_per_m", "damping_n_s_per_m")
+    skip = (
+        *("position_m", "orientation", "stiffness_n_per_m", "damping_n_s_per_m"),
+        *("hold_s", "max_speed_m_per_s"),
+    )
     return [
         {key: value for key, value in config.__dict__.items() if at > 0 or key not in skip}
         for at, config in enumerate(configs)

@@ -44,8 +44,11 @@ class SolidContact:
         friction_j: energy that slipping took, a part of what is dissipated [J].
         friction_stored_j: energy in the spring along the surface, a part of what is stored [J].
         depth_m: of the device in the solid [m].
+        moves: whether a client moves it.
+        carried_j: work of its force along its own way [J].
     """
 
+    moves = False
     carried_j = 0.0
 
     __slots__ = (

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterable
+from typing import TYPE_CHECKING, cast
 
 from hapticd.config.models import SceneConfig, VelocityConfig
+from hapticd.config.ports import PortLimits, port_limits
 from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo, Sample
 from hapticd.errors import ConfigError
@@ -20,6 +22,16 @@ from hapticd.tick.space.channel import Channel
 from hapticd.tick.space.solid import Solid, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
 from hapticd.tick.tick import ControlTick, MakePort
+
+if TYPE_CHECKING:  # what a scene without remote objects never loads
+    from hapticd.tick.remote.remote_object import RemoteContact
+
+MakeRemote = Callable[[Solid, Callable[[], RunningLaw], float, PortLimits, float], "RemoteContact"]
+"""Makes the contact of an object that a client moves: the solid, a fresh law, the device's resolution [m], its limits,
+the duration of its ramps [s]."""
+
+Limits = dict[str, PortLimits]
+"""What clients may do with the objects that they move, by name."""
 
 _DISARMED, _ARMED = Mode.DISARMED, Mode.ARMED
 
@@ -49,11 +61,12 @@ class SpaceTick(ControlTick):
         period_s: float,
         ramp_s: float,
         make_port: MakePort | None = None,
+        make_remote: MakeRemote | None = None,
     ) -> None:
         super().__init__(scene, velocity, guard, info, make_law, period_s, ramp_s, make_port)
-        self.solids = [
-            SolidContact(solid, make_law, info.resolution_m) for solid in compile_objects(scene.objects, period_s)
-        ]
+        self._make_remote = make_remote
+        limits = _object_limits(scene)
+        self.solids = [self._contact(solid, make_law, limits) for solid in compile_objects(scene.objects, period_s)]
         self.objects = len(scene.objects)
         self.awake: list[SolidContact] = []
         self.books = SpaceBooks()
@@ -88,18 +101,19 @@ class SpaceTick(ControlTick):
         """
         make = self.make_law if make_law is None else make_law
         there = self.solids
+        limits = {} if scene is None else _object_limits(scene)
         changed: list[tuple[SolidContact, Solid, list[Channel]]] = []
         fading: list[tuple[SolidContact, list[tuple[Contact, RunningLaw]]]] = []
         new: list[SolidContact] = []
         if scene is not None:
             solids = compile_objects(scene.objects, self.period_s)
             yield
-            known = {contact.solid.name: contact for contact in self.solids}
+            known = {(contact.solid.name, contact.moves): contact for contact in self.solids}
             there = []
             for solid in solids:
-                contact = known.pop(solid.name, None)
+                contact = known.pop((solid.name, solid.remote), None)
                 if contact is None:
-                    contact = SolidContact(solid, make, self.info.resolution_m)
+                    contact = self._contact(solid, make, limits)
                     new.append(contact)
                 elif not solid.same_as(contact.solid):
                     changed.append((contact, solid, contact.rougher(solid, make)))
@@ -136,6 +150,9 @@ class SpaceTick(ControlTick):
         self.solids = there
         if scene is not None:
             self.objects = len(scene.objects)
+            for each in self._moving():
+                each.ramp_s = self.ramp_s
+                each.port.change(limits[each.port.name])
         if self.fallback:
             laws = self._start_laws([(channel, self._fallback_law()) for channel in fresh])
         for channel, law in laws:
@@ -262,9 +279,21 @@ class SpaceTick(ControlTick):
             for channel in contact.channels:
                 self._blend(channel)
 
+    def _contact(self, solid: Solid, make_law: Callable[[], RunningLaw], limits: Limits) -> SolidContact:
+        if solid.remote:
+            if self._make_remote is None:
+                raise ConfigError(f'"{solid.name}": this tick has no remote objects')
+            return self._make_remote(solid, make_law, self.info.resolution_m, limits[solid.name], self.ramp_s)
+        return SolidContact(solid, make_law, self.info.resolution_m)
+
+    def _moving(self) -> list[RemoteContact]:
+        return [cast("RemoteContact", contact) for contact in self.solids if contact.moves]
+
     def _take_solids(self) -> None:
         """Run what the scene needs from now on."""
         self._nearby = Nearby([contact.solid.proxy for contact in self.solids])
+        self.ports = [*(contact.port for contact in self._moving()), *self.couplings]
+        self.has_ports = self.has_ports or bool(self.ports)
         self.has_objects = self.has_objects or bool(self.solids)  # and their books once they are gone
         self.advance = self.step_in_space if self.has_objects else self.step
         self._look_around()
@@ -277,7 +306,7 @@ class SpaceTick(ControlTick):
         self._held = [contact for contact in self._held if contact in self._fading or contact in self.solids]
         resting = []
         for at, contact in enumerate(self.solids):
-            if at in near or not contact.quiet:
+            if at in near or not contact.quiet or contact.moves:
                 if id(contact) not in before and contact.quiet:
                     contact.start(*self._at)
                 self.awake.append(contact)
@@ -300,6 +329,10 @@ class SpaceTick(ControlTick):
                 self.books.close(contact)
             self._fading = [contact for contact in self._fading if contact not in gone]
             self._take_solids()
+
+
+def _object_limits(scene: SceneConfig) -> Limits:
+    return {limits.name: limits for limits in port_limits(scene) if limits.kind == "object"}
 
 
 def _no_law() -> RunningLaw:

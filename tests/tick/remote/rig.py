@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -152,7 +153,7 @@ class Rig:
 
 
 class Hand:
-    """A device of one mass an axis that moves by what the rig gives it, and a hand."""
+    """A device of one mass an axis, exact under a held force, and a hand that pushes it."""
 
     def __init__(self, rig: Rig, mass_kg: float = 0.25, viscous_n_s_per_m: float = 4.4) -> None:
         self.rig = rig
@@ -166,11 +167,12 @@ class Hand:
         path = []
         for _ in range(ticks):
             at = list(self.rig.at)
+            keep = math.exp(-self.viscous / self.mass_kg * PERIOD_S)
             for axis, newton in enumerate(self.rig.force):
-                for _ in range(4):
-                    slope = (newton + pushed[axis] - self.viscous * self.speed[axis]) / self.mass_kg
-                    self.speed[axis] += slope * PERIOD_S / 4
-                    at[axis] += self.speed[axis] * PERIOD_S / 4
+                ends = (newton + pushed[axis]) / self.viscous
+                off = self.speed[axis] - ends
+                at[axis] += ends * PERIOD_S + off * (1.0 - keep) * self.mass_kg / self.viscous
+                self.speed[axis] = ends + off * keep
             self.rig.go(at)
             path.append(at)
         return path

@@ -14,6 +14,16 @@ from hapticd.tick.remote.streamed_force import BLEND_S
 from tests.tick.remote.rig import COUPLING, FORCE_PORT, MOST_N, PERIOD_S, RAMP_S, Rig, apart, length
 
 K, B, FASTEST = 2000.0, 5.0, 1.0
+BALL = """
+[[scene.objects]]
+name = "ball"
+shape = "sphere"
+radius_m = 0.03
+stiffness_n_per_m = 2000.0
+static_friction = 0.5
+dynamic_friction = 0.4
+remote = true
+"""
 ANY = st.floats(-1e308, 1e308) | st.sampled_from([0.0, -0.0, 1e-308, 5e-324, 1e308, -1e308])
 NEAR = st.floats(-0.05, 0.05)
 VECTOR = st.lists(ANY | NEAR, min_size=3, max_size=3)
@@ -41,7 +51,7 @@ MESSAGES = st.lists(
 )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(messages=MESSAGES, law=st.sampled_from(["none", "tdpa", "energy-cycle", "ring-damping"]), shake=st.booleans())
 def test_each_port_stays_within_its_limit_and_the_books_balance(
     messages: list[tuple[int, str, dict[str, Any]]], law: str, shake: bool
@@ -60,7 +70,7 @@ def test_each_port_stays_within_its_limit_and_the_books_balance(
     assert rig.unbalanced_j() < 1e-9 * max(1.0, abs(rig.energy_j))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(messages=MESSAGES)
 def test_on_a_device_at_rest_no_force_steps(messages: list[tuple[int, str, dict[str, Any]]]) -> None:
     """Without a law: what clients do changes a force by its ramps, the target's motion and the blend of a force."""
@@ -78,6 +88,25 @@ def test_on_a_device_at_rest_no_force_steps(messages: list[tuple[int, str, dict[
             rig.go()
             for port, step_n in most_n.items():
                 assert apart(rig[port].force_n, before[port]) <= step_n * (1.0 + 1e-9)
+
+
+@settings(max_examples=8, deadline=None)
+@given(messages=MESSAGES, turns=st.lists(st.lists(ANY, min_size=4, max_size=4), min_size=12, max_size=12))
+def test_an_object_goes_no_faster_than_its_limit_and_the_books_balance(
+    messages: list[tuple[int, str, dict[str, Any]]], turns: list[list[float]]
+) -> None:
+    rig = Rig(BALL, law="energy-cycle", axes="xyz")
+    n = 0
+    for (wait, _, fields), orientation in zip(messages, turns, strict=False):
+        rig.say("ball", orientation=orientation, **fields)
+        for _ in range(min(wait, 40) + 1):
+            n += 1
+            before = list(rig["ball"].target_m)
+            rig.go([2e-3 * math.sin(0.05 * n), 0.0, 0.03 + 1e-3 * math.cos(0.11 * n)])
+            assert apart(rig["ball"].target_m, before) <= FASTEST * PERIOD_S * (1.0 + 1e-9)
+            assert length(rig.force) <= 12.0 * (1.0 + 1e-12)
+    assert rig.tick.fault == 0
+    assert rig.unbalanced_j() < 1e-9
 
 
 @pytest.mark.parametrize("law", ["none", "damper", "tdpa", "energy-cycle", "ring-damping", "energy-bounding"])

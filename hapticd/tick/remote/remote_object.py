@@ -1,0 +1,227 @@
+"""An object that a client moves: the port, and the contact that sees the device from the object."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+
+from hapticd.config.remote import PortLimits
+from hapticd.shapes.pose import Pose, Vector
+from hapticd.tick.contact import RunningLaw
+from hapticd.tick.remote.follower import Follower
+from hapticd.tick.remote.port import Port
+from hapticd.tick.remote.turning import Turning, unit
+from hapticd.tick.remote.update import DAMPING, ORIENTATION, POSITION, STIFFNESS, TURNING, VELOCITY, Update
+from hapticd.tick.space.channel import Channel
+from hapticd.tick.space.solid import Solid
+from hapticd.tick.space.solid_contact import SolidContact
+
+ENDLESS_M = 0.1
+"""Distance from its origin at which a plane turns no faster than its client may move it [m]."""
+
+
+class RemoteObject(Port):
+    """What a client says of an object, followed without a jump. One that is silent stops: it keeps its place.
+
+    Args:
+        limits: what it may do.
+        contact: the object's contact.
+
+    Attributes:
+        follower: of its origin.
+        turning: of its orientation.
+    """
+
+    __slots__ = ("_contact", "_damping", "_stiffness", "follower", "turning")
+
+    def __init__(self, limits: PortLimits, contact: RemoteContact) -> None:
+        super().__init__(limits, 3)
+        first = contact.solid.configs[0]
+        self._contact = contact
+        self.follower = Follower(3, limits.max_speed_m_per_s, limits.hold_s)
+        self.turning = Turning(first.orientation, self._max_turning(limits), limits.hold_s)
+        self.target_m = self.follower.at_m
+        self._stiffness = contact.solid.stiffness_n_per_m
+        self._damping = contact.solid.damping_n_s_per_m
+        self.stop(first.position_m)
+
+    @property
+    def work_j(self) -> float:
+        """What the client's motion and changes have put in, less what they took [J]."""
+        return self._contact.moved_j
+
+    @property
+    def rests(self) -> bool:
+        """Whether the object is where it is to be, and stays."""
+        return self.follower.rests and self.turning.follower.rests
+
+    def law_values(self) -> tuple[float, float, float]:
+        """Stiffness in force [N/m], damping of the law [N s/m] and the mass that it has felt [kg], for a record."""
+        normal = self._contact.normal
+        return self._contact.solid.stiffness_n_per_m, normal.damping_n_s_per_m, normal.felt_mass_kg
+
+    def change(self, limits: PortLimits) -> None:
+        """Go on under other limits, and with what they say of the surface until the client says otherwise."""
+        self.limits = limits
+        self.follower.max_speed_m_per_s = limits.max_speed_m_per_s
+        self.turning.follower.max_speed_m_per_s = self._max_turning(limits)
+        self.follower.hold_s = self.turning.follower.hold_s = limits.hold_s
+        self._stiffness = self._contact.solid.stiffness_n_per_m
+        self._damping = self._contact.solid.damping_n_s_per_m
+
+    def stop(self, position_m: Vector | None = None) -> None:
+        """Stay where it is, or at a place."""
+        at_m = tuple(self.follower.at_m) if position_m is None else position_m
+        self.follower.begin(at_m, (0.0, 0.0, 0.0))
+        self.follower.aim(at_m)
+        self.turning.stop()
+
+    def move(self, dt_s: float) -> Pose:
+        """Where it is after a tick [s]."""
+        self.follower.move(dt_s)
+        self.turning.move(dt_s)
+        return Pose.of(self.follower.at_m, self.turning.now)
+
+    def towards(self, step: float) -> tuple[float, float]:
+        """Stiffness and damping of its surface after a step of their ramps, a share of the whole."""
+        solid = self._contact.solid
+        first = solid.configs[0]
+        most = (first.stiffness_n_per_m * step, abs(first.damping_n_s_per_m) * step)
+        return (
+            _towards(solid.stiffness_n_per_m, self._stiffness, most[0]),
+            _towards(solid.damping_n_s_per_m, self._damping, most[1]),
+        )
+
+    def _hear(self, update: Update) -> bool:
+        said = update.said
+        first = self._contact.solid.configs[0]
+        self._stiffness = first.stiffness_n_per_m
+        self._damping = first.damping_n_s_per_m
+        if said & STIFFNESS:
+            self._stiffness = min(max(update.stiffness_n_per_m, 0.0), self._stiffness)
+        if said & DAMPING:
+            self._damping = min(max(update.damping_n_s_per_m, 0.0), max(0.0, self._damping))
+        if said & (POSITION | VELOCITY):
+            at_m = update.position_m if said & POSITION else self.follower.at_m
+            self.follower.aim(at_m, update.velocity_m_per_s if said & VELOCITY else None)
+        if said & (ORIENTATION | TURNING):
+            self.turning.aim(
+                update.orientation if said & ORIENTATION else None,
+                update.angular_velocity_rad_per_s if said & TURNING else None,
+            )
+        return bool(said & (POSITION | VELOCITY | ORIENTATION | TURNING | STIFFNESS | DAMPING))
+
+    def _max_turning(self, limits: PortLimits) -> float:
+        outer_m = self._contact.solid.placed[0].outer_m()
+        return limits.max_speed_m_per_s / (outer_m if outer_m < inf else ENDLESS_M)
+
+
+class RemoteContact(SolidContact):
+    """A solid that a client moves. Laws and books see the device from it; its own motion is the client's work.
+
+    Args:
+        solid: the compiled solid, of one object.
+        make_law: a fresh law, one a direction.
+        resolution_m: smallest step of the device's position [m].
+        limits: what the client may do.
+        ramp_s: duration of the ramps of stiffness and damping [s].
+
+    Attributes:
+        port: what the client says.
+        carried_j: work of its force along the way of the touched point [J].
+        ramp_s: duration of the ramps of stiffness and damping [s].
+    """
+
+    moves = True
+
+    __slots__ = ("_before_n_per_m", "carried_j", "port", "ramp_s")
+
+    def __init__(
+        self,
+        solid: Solid,
+        make_law: Callable[[], RunningLaw],
+        resolution_m: float,
+        limits: PortLimits,
+        ramp_s: float,
+    ) -> None:
+        super().__init__(solid, make_law, resolution_m)
+        self.carried_j = 0.0
+        self.ramp_s = ramp_s
+        self._before_n_per_m = solid.stiffness_n_per_m
+        self.port = RemoteObject(limits, self)
+
+    def start(self, x: float, y: float, z: float) -> None:
+        """Have the device at a point of the world, at rest and without force; the object stops where it is."""
+        super().start(x, y, z)
+        self.port.forget()
+        self.port.stop()
+        self.port.force_n[:] = (0.0, 0.0, 0.0)
+
+    def change(self, solid: Solid, along: list[Channel], limit_n: float, at: Vector) -> None:
+        """Go on with another solid in the place of this one, and without force: its shade keeps that."""
+        port = self.port
+        was = Pose.of(port.follower.at_m, port.turning.now)
+        super().change(solid, along, limit_n, at)
+        self._before_n_per_m = solid.stiffness_n_per_m
+        if solid.proxy.pose != was:
+            port.turning.now = unit(solid.configs[0].orientation) or port.turning.now
+            port.stop(solid.placed[0].pose.position_m)
+
+    def let_go(self, limit_n: float) -> None:
+        """Be gone: what is left of the force fades out."""
+        super().let_go(limit_n)
+        self._before_n_per_m = 0.0
+        self.port.forget()
+
+    def observe(self, at: Vector, velocity: Vector, way: Vector, dt_s: float) -> bool:
+        """See a new sample from the object, which has moved since."""
+        port = self.port
+        for axis, newton in enumerate(port.force_n):
+            port.impulse_n_s[axis] += newton * dt_s
+        port.pass_time(dt_s)
+        if self.leaving:
+            return super().observe(at, velocity, way, dt_s)
+        solid = self.solid
+        step = dt_s / self.ramp_s if dt_s < self.ramp_s else 1.0
+        self._before_n_per_m = solid.stiffness_n_per_m
+        solid.stiffness_n_per_m, solid.damping_n_s_per_m = port.towards(step)
+        if port.rests:
+            return super().observe(at, velocity, way, dt_s)
+        proxy = solid.proxy
+        before = proxy.pose
+        pose = port.move(dt_s)
+        qx, qy, qz = proxy.move(pose)
+        if not proxy.touching:
+            qx, qy, qz = (to - of for to, of in zip(pose.point(before.own(at)), at, strict=True))
+        elif not self.quiet:
+            fx, fy, fz = self.force
+            work_j = fx * qx + fy * qy + fz * qz
+            self.carried_j += work_j
+            self.moved_j += work_j
+        seen = (way[0] - qx, way[1] - qy, way[2] - qz)
+        speed = (velocity[0] - qx / dt_s, velocity[1] - qy / dt_s, velocity[2] - qz / dt_s)
+        return super().observe(at, speed, seen, dt_s)
+
+    def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
+        """Enter the tick into the books and remember what is applied from now on.
+
+        First the motion with the spring as it was, then what has become of the spring: that is the client's work.
+        """
+        solid = self.solid
+        now_n_per_m = solid.stiffness_n_per_m
+        changed = now_n_per_m != self._before_n_per_m
+        solid.stiffness_n_per_m = self._before_n_per_m
+        super().settle(share, gain, limit_n, dt_s)
+        if changed:
+            solid.stiffness_n_per_m = self._before_n_per_m = now_n_per_m
+            self._spring_n = gain * min(now_n_per_m * self.depth_m, limit_n)
+            stored_j = 0.0
+            if self.depth_m > 0.0 and now_n_per_m > 0.0:
+                stored_j = gain * solid.stored_j(self._stretch_m(), limit_n)
+            self.moved_j += stored_j - self.ledger.stored_j
+            self.ledger.stored_j = stored_j
+        self.port.force_n[:] = self.force
+
+
+def _towards(now: float, goal: float, most: float) -> float:
+    return min(goal, now + most) if now < goal else max(goal, now - most)
