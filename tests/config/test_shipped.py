@@ -22,6 +22,7 @@ RESTS = ["fig6-set1", "fig6-set2-wall", "fig6-set2-device", "native-8-none", "ev
     f"wall-{k}-{law}" for k in (12, 18, 20) for law in ("energy-cycle", "tdpa")
 ]
 IN_SPACE = {"ball", "cup", "table-edge", "peg-in-hole", "mesh"}  # tests/offline/test_space.py holds them to their word
+DRIVEN = {"remote-tool"}  # tests/tick/remote/test_shipped.py drives it
 OSCILLATES = [f"wall-{k}-{law}" for k in (12, 18, 20) for law in ("none", "tdpa-unbounded")]
 
 
@@ -65,7 +66,7 @@ def test_a_configuration_that_promises_oscillation_oscillates(name: str) -> None
 
 
 def test_every_shipped_configuration_promises_something() -> None:
-    assert {file.stem for file in SHIPPED} == {*RESTS, *OSCILLATES, *REAL_DEVICES, *IN_SPACE, "hapticd"}
+    assert {file.stem for file in SHIPPED} == {*RESTS, *OSCILLATES, *REAL_DEVICES, *IN_SPACE, *DRIVEN, "hapticd"}
 
 
 def test_the_reference_names_every_key_of_the_daemon() -> None:
