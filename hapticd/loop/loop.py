@@ -10,7 +10,17 @@ from hapticd.config.models import LoopConfig
 from hapticd.config.safety import SafetyConfig
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
-from hapticd.loop.memory import ANSWERED, DISARM, DISARMED, RECORDS, REQUESTS, SKIPPED, SUPERVISOR_BEAT, SharedMemory
+from hapticd.loop.memory import (
+    ANSWERED,
+    DISARM,
+    DISARMED,
+    RECORDS,
+    REMOTE,
+    REQUESTS,
+    SKIPPED,
+    SUPERVISOR_BEAT,
+    SharedMemory,
+)
 from hapticd.loop.requests import RequestHandler
 from hapticd.loop.resume import FROM_START, ResumeState
 from hapticd.loop.session import Session
@@ -123,7 +133,7 @@ class ControlLoop:
         shared = session.shared
         words = shared.words
         requests = self.requests
-        sleep_until = self._sleep_until
+        wait = self._waiting()
         read = driver.read
         write = driver.write
         monotonic_ns = time.monotonic_ns
@@ -149,7 +159,7 @@ class ControlLoop:
         last_ns = deadline_ns - period_ns
         cpu_ns = 0
         while True:
-            woke_ns = sleep_until(deadline_ns)
+            woke_ns = wait(deadline_ns)
             session.deadline_ns = deadline_ns
 
             try:
@@ -187,6 +197,7 @@ class ControlLoop:
             if words[REQUESTS] != words[ANSWERED]:
                 used_ns = thread_time_ns()
                 requests.work()
+                wait = self._waiting()
                 cpu_ns += thread_time_ns() - used_ns  # a law does not answer for what was asked for
             if session.stop_requested and not self._stopping:
                 self._stopping = True
@@ -238,6 +249,27 @@ class ControlLoop:
                         session.report_fault()
                 cpu_ns = used_ns
                 watched = BUDGET_TICKS if over else watched - 1
+
+    def _waiting(self) -> Callable[[int], int]:
+        """How to wait for a deadline: where clients drive something, with a look at what they have said until then."""
+        session = self.session
+        sleep_until = self._sleep_until
+        ports = session.tick.ports
+        if not ports:
+            return sleep_until
+        words = session.shared.words
+        said = session.said
+
+        def wait(deadline_ns: int) -> int:
+            woke_ns = sleep_until(deadline_ns)
+            if words[REMOTE] != said.seen:
+                said.take()
+            for port in ports:
+                if port.news is not None:
+                    session.report_port(port)
+            return woke_ns
+
+        return wait
 
     def _leave(self) -> None:
         """Tell of a fault of the last tick, and leave what the next loop on this device goes on from."""

@@ -1,6 +1,6 @@
 """The memory that the loop and the supervisor share.
 
-    words | the driver's metrics | answer | request | events | the driver's trace | tick records
+    words | the driver's metrics | answer | request | events | the driver's trace | what clients say | tick records
 
 One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
 copied a slot: on x86-64 stores become visible in order and a word in one go, so what was not overwritten by then is
@@ -18,11 +18,17 @@ from typing import Any
 
 import msgpack
 
+from hapticd.config.objects import MAX_OBJECTS
+from hapticd.config.remote import MAX_PORTS
 from hapticd.device import MOST_METRICS
 from hapticd.errors import HapticdError
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.record import RecordLayout, TickRecord
+from hapticd.tick.remote.update import SLOT_BYTES
 from hapticd.trace import AREA_BYTES
+
+MOST_PORTS = MAX_OBJECTS + MAX_PORTS
+"""Most things in a scene that clients may drive."""
 
 HISTORY_S = 8.0
 """How much of the past the ring of records holds [s]."""
@@ -42,7 +48,9 @@ HISTORY_S = 8.0
     LAW,
     MAY_ARM,
     LATCHED,
-) = range(14)
+    REMOTE,  # updates that clients sent for what they may drive
+    PORTS,  # which list of those things the loop has: `hapticd.loop.remote_slots`
+) = range(16)
 """Words, each written by one side only."""
 
 DISARMED_SINCE = "not done: disarming was asked for after it"
@@ -62,7 +70,8 @@ _EVENTS = _REQUEST + _REQUEST_SIZE
 _EVENT_SIZE = 1024
 _EVENT_SLOTS = 256
 _TRACE = _EVENTS + _EVENT_SIZE * _EVENT_SLOTS
-_RECORDS = _TRACE + AREA_BYTES
+_REMOTE = _TRACE + AREA_BYTES
+_RECORDS = _REMOTE + MOST_PORTS * SLOT_BYTES
 
 
 class SharedMemory:
@@ -78,6 +87,8 @@ class SharedMemory:
         words: the 64-bit words at the start.
         metrics: the driver's metrics; it writes each of them as a whole.
         trace: the driver's trace, as `hapticd.trace` keeps it.
+        remote: what clients say, as `hapticd.loop.remote_slots` keeps it.
+        remote_words: the same as 64-bit words.
         record_area: where the records lie.
         descriptor: file descriptor to hand to the other process.
 
@@ -101,7 +112,9 @@ class SharedMemory:
         self.view = memoryview(self._map)
         self.words = self.view[:_METRICS].cast("q")
         self.metrics = self.view[_METRICS : _METRICS + 8 * MOST_METRICS].cast("d")
-        self.trace = self.view[_TRACE:_RECORDS]
+        self.trace = self.view[_TRACE:_REMOTE]
+        self.remote = self.view[_REMOTE:_RECORDS]
+        self.remote_words = self.remote.cast("q")
         self.record_area = self.view[_RECORDS:]
 
     def close(self) -> None:
@@ -109,6 +122,8 @@ class SharedMemory:
         self.words.release()
         self.metrics.release()
         self.trace.release()
+        self.remote_words.release()
+        self.remote.release()
         self.record_area.release()
         self.view.release()
         self._map.close()
@@ -164,15 +179,16 @@ class RecordReader:
 
     Args:
         shared: the memory.
+        newest: begin with the next record, not with the oldest that is there.
 
     Attributes:
         dropped: records lost because the reader was too slow.
     """
 
-    def __init__(self, shared: SharedMemory) -> None:
+    def __init__(self, shared: SharedMemory, *, newest: bool = False) -> None:
         self._shared = shared
         self._area = shared.record_area
-        self._next = 0
+        self._next = shared.words[RECORDS] if newest else 0
         self.dropped = 0
 
     @property

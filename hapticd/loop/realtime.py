@@ -26,11 +26,16 @@ _sleep = time.sleep
 _latency_hold: int | None = None
 
 
-def die_with_parent(parent_pid: int) -> None:
-    """Get SIGTERM when the parent dies; also when it has died already."""
-    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+def die_with_parent(parent_pid: int, by: signal.Signals = signal.SIGTERM) -> None:
+    """Get a signal when the parent dies; also when it has died already."""
+    _libc.prctl(_PR_SET_PDEATHSIG, by, 0, 0, 0)
     if os.getppid() != parent_pid:
-        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), by)
+
+
+def sleep_exactly() -> None:
+    """Have sleeps of this thread end when they are due at normal priority too, and not 50 us later."""
+    _libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
 def become_realtime(config: LoopConfig) -> tuple[list[str], list[str]]:
@@ -67,7 +72,7 @@ def become_realtime(config: LoopConfig) -> tuple[list[str], list[str]]:
             f"no SCHED_FIFO {config.priority} ({error.strerror}): grant CAP_SYS_NICE or an rtprio limit of "
             f"{config.priority}"
         )
-        _libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # else every sleep ends 50 us late
+        sleep_exactly()
     if problems and config.realtime == "required":
         raise RealtimeError('loop.realtime = "required", but ' + "; ".join(problems))
     return problems, advice

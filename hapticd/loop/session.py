@@ -8,9 +8,12 @@ from typing import Any
 from hapticd.driver import Driver
 from hapticd.errors import DriverError
 from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED, SharedMemory
+from hapticd.loop.remote_slots import SlotReader
 from hapticd.loop.resume import ResumeState
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.guard import Mode
+from hapticd.tick.remote.port import Port
+from hapticd.tick.remote.port_state import PortState
 from hapticd.tick.tick import ControlTick
 
 
@@ -31,6 +34,7 @@ class Session:
         deadline_ns: when the tick under way was due [ns of CLOCK_MONOTONIC]; 0 before the first.
         stall_ns: how long the supervisor may be silent [ns].
         stop_requested: the force is to be ramped to zero and the loop to end.
+        said: what clients say of what they may drive.
     """
 
     def __init__(
@@ -45,6 +49,8 @@ class Session:
         self.deadline_ns = 0
         self.stall_ns = int(stall_s * 1e9)
         self.stop_requested = False
+        self.said = SlotReader(shared)
+        self.said.serve(tick.ports)
         tick.guard.latched = resume.latched
         words = shared.words
         words[NEXT_SEQ] = resume.seq
@@ -85,6 +91,15 @@ class Session:
         if tick.fault:
             self.event(EventCode(tick.fault), tick.fault_text)
             tick.fault = 0
+
+    def report_port(self, port: Port) -> None:
+        """Tell that what a client drives was let go, or is in force again."""
+        news, port.news = port.news, None
+        if news is PortState.STALE:
+            text = f"{port.name}: its client is silent, or says the same for too long: let go until it says more"
+            self.event(EventCode.REMOTE_STALE, text, name=port.name)
+        elif news is not None:
+            self.event(EventCode.REMOTE_BACK, f"{port.name}: in force again", name=port.name)
 
     def leave(self) -> None:
         """Write down what the next loop on this device goes on from; the tick has been started.

@@ -24,6 +24,7 @@ class EventCode(enum.IntEnum):
     CALIBRATED = 109
     TARED = 110
     MARKED = 111
+    REMOTE_BACK = 112
 
     LAW_FAILED = 200
     LAW_OVER_BUDGET = 201
@@ -44,6 +45,8 @@ class EventCode(enum.IntEnum):
     DEVICE_WARNING = 305
     CALIBRATION_ENDED = 306
     HELPER_MISSING = 307
+    REMOTE_STALE = 308
+    REMOTE_LOST = 309
 
 
 @dataclass(slots=True)

@@ -1,0 +1,132 @@
+"""What clients say of each port of the scene, in shared memory: one process writes it, the loop reads it.
+
+A slot a port:
+
+    counter, odd while the slot is being written | list of ports that it is for | the update
+
+The word `REMOTE` counts the updates written, so that a tick in which there was none compares one number. Which list of
+ports an update is for is told by `list_of`, the same on either side: after a reload an update under way for the list
+before is not taken for another name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+
+import msgpack
+
+from hapticd.loop.memory import MOST_PORTS, PORTS, REMOTE, SharedMemory
+from hapticd.tick.remote.port import Port
+from hapticd.tick.remote.update import SLOT_BYTES, Update, pack, unpack
+
+_WORDS = SLOT_BYTES // 8
+_UPDATE = 16
+"""Where the update lies in a slot [bytes]."""
+
+
+def list_of(ports: Iterable[tuple[str, str]]) -> int:
+    """A number for a list of ports, never 0.
+
+    Args:
+        ports: name and kind of each, in the order of the scene.
+    """
+    said: bytes = msgpack.packb([list(each) for each in ports])
+    return int.from_bytes(hashlib.blake2b(said, digest_size=8).digest(), "little") >> 1 | 1
+
+
+class SlotReader:
+    """The loop's side.
+
+    Args:
+        shared: the memory.
+
+    Attributes:
+        seen: the word `REMOTE` as it was when everything up to then was taken.
+    """
+
+    def __init__(self, shared: SharedMemory) -> None:
+        self.seen = 0
+        self._shared = shared
+        self._area = shared.remote
+        self._words = shared.remote_words
+        self._counters = [0] * MOST_PORTS
+        self._ports: Sequence[Port] = ()
+        self._list = 0
+        self._update = Update()
+
+    def serve(self, ports: Sequence[Port]) -> None:
+        """Take updates for these ports from now on."""
+        self._ports = ports
+        self._list = list_of((port.name, port.kind) for port in ports)
+        self._shared.words[PORTS] = self._list
+
+    def take(self) -> None:
+        """Hand each port what was said of it since the last time; what is just being written waits for the next."""
+        written = self._shared.words[REMOTE]
+        words = self._words
+        counters = self._counters
+        update = self._update
+        whole = True
+        for index, port in enumerate(self._ports):
+            at = index * _WORDS
+            counter = words[at]
+            if counter == counters[index]:
+                continue
+            meant = words[at + 1]
+            if not counter & 1:
+                unpack(self._area, index * SLOT_BYTES + _UPDATE, update)
+            if counter & 1 or words[at] != counter:
+                whole = False
+                continue
+            counters[index] = counter
+            if meant == self._list:
+                port.take(update)
+        if whole:
+            self.seen = written
+
+
+class SlotWriter:
+    """The other side.
+
+    What one that died had begun to write is put right, for no port: the loop would look at it again each tick.
+
+    Args:
+        shared: the memory.
+        ports: name and kind of each, in the order of the scene.
+
+    Attributes:
+        ports_list: the number of their list.
+    """
+
+    def __init__(self, shared: SharedMemory, ports: Iterable[tuple[str, str]]) -> None:
+        self.ports_list = list_of(ports)
+        self._shared = shared
+        self._area = shared.remote
+        self._words = shared.remote_words
+        for at in range(0, MOST_PORTS * _WORDS, _WORDS):
+            if self._words[at] & 1:
+                self._words[at + 1] = 0
+                self._words[at] += 1
+                shared.words[REMOTE] += 1
+
+    @property
+    def in_force(self) -> bool:
+        """Whether the loop has the same list of ports."""
+        return self._shared.words[PORTS] == self.ports_list
+
+    def write(self, index: int, update: Update) -> None:
+        """Say something of a port.
+
+        Args:
+            index: which one.
+            update: all that was said of it.
+        """
+        words = self._words
+        at = index * _WORDS
+        counter = words[at]
+        words[at] = counter + 1
+        words[at + 1] = self.ports_list
+        pack(update, self._area, index * SLOT_BYTES + _UPDATE)
+        words[at] = counter + 2
+        self._shared.words[REMOTE] += 1

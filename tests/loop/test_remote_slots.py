@@ -1,0 +1,186 @@
+"""What clients say reaches the loop: the newest, whole, for the port that was meant, whoever dies in between."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from hapticd.loop.memory import MOST_PORTS, REMOTE, SharedMemory
+from hapticd.loop.remote_slots import SlotReader, SlotWriter, list_of
+from hapticd.tick.record import RecordLayout
+from hapticd.tick.remote.update import POSITION, SLOT_BYTES, Update
+from tests.remote.heard import BALL, FIELD, TOOL, HeardPort
+
+LAYOUT = RecordLayout(1, False, 8)
+RATE_HZ = 100.0
+PORTS = [(port.name, port.kind) for port in (TOOL, FIELD)]
+
+HAMMER = """
+import sys
+from hapticd.loop.memory import SharedMemory
+from hapticd.loop.remote_slots import SlotWriter
+from hapticd.tick.record import RecordLayout
+from hapticd.tick.remote.update import Update
+shared = SharedMemory(RecordLayout(1, False, 8), 100.0, int(sys.argv[1]))
+writer = SlotWriter(shared, [("tool", "coupling"), ("field", "force")])
+update, number = Update(), 0
+print(flush=True)
+while True:
+    number += 1
+    update.seq = update.sent_ns = update.received_ns = update.said = number
+    motion = (update.position_m, update.velocity_m_per_s, update.angular_velocity_rad_per_s)
+    for vector in (*motion, update.force_n, update.orientation):
+        vector[:] = [float(number)] * len(vector)
+    update.stiffness_n_per_m = update.damping_n_s_per_m = float(number)
+    writer.write(number % 2, update)
+"""
+
+
+@pytest.fixture
+def shared() -> Iterator[SharedMemory]:
+    memory = SharedMemory(LAYOUT, RATE_HZ)
+    yield memory
+    memory.close()
+
+
+@pytest.fixture
+def ports() -> list[HeardPort]:
+    return [HeardPort(TOOL), HeardPort(FIELD)]
+
+
+@pytest.fixture
+def reader(shared: SharedMemory, ports: list[HeardPort]) -> SlotReader:
+    reader = SlotReader(shared)
+    reader.serve(ports)
+    return reader
+
+
+def at(position_m: float, seq: int = 1) -> Update:
+    update = Update()
+    update.said = POSITION
+    update.seq = seq
+    update.position_m[0] = position_m
+    return update
+
+
+def test_what_is_said_of_a_port_is_taken_once_and_by_that_port(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    writer = SlotWriter(shared, PORTS)
+    writer.write(1, at(0.25))
+    reader.take()
+    reader.take()
+    assert [update.position_m[0] for update in ports[1].heard] == [0.25]
+    assert ports[0].heard == []
+    assert reader.seen == shared.words[REMOTE]
+
+
+def test_of_several_updates_the_latest_is_taken(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    writer = SlotWriter(shared, PORTS)
+    for number in range(5):
+        writer.write(0, at(number, seq=number))
+    reader.take()
+    assert [update.seq for update in ports[0].heard] == [4]
+
+
+def test_a_slot_that_is_just_being_written_waits_and_holds_no_other_up(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    writer = SlotWriter(shared, PORTS)
+    writer.write(0, at(0.1))
+    writer.write(1, at(0.2))
+    shared.remote_words[0] -= 1  # as it is until the last store
+    reader.take()
+    assert ports[0].heard == []
+    assert [update.position_m[0] for update in ports[1].heard] == [0.2]
+    assert reader.seen != shared.words[REMOTE], "it is looked for again"
+    shared.remote_words[0] += 1
+    reader.take()
+    assert [update.position_m[0] for update in ports[0].heard] == [0.1]
+    assert len(ports[1].heard) == 1
+    assert reader.seen == shared.words[REMOTE]
+
+
+def test_what_a_killed_writer_has_left_half_done_is_taken_for_no_port(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    before = SlotWriter(shared, PORTS)
+    before.write(0, at(0.1))
+    shared.remote_words[0] -= 1
+    after = SlotWriter(shared, PORTS)
+    reader.take()
+    assert ports[0].heard == []
+    assert reader.seen == shared.words[REMOTE], "and it costs no tick any more"
+    after.write(0, at(0.3))
+    reader.take()
+    assert [update.position_m[0] for update in ports[0].heard] == [0.3]
+
+
+def test_an_update_for_another_list_of_ports_is_taken_for_no_name(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    before = SlotWriter(shared, PORTS)
+    assert before.in_force
+    reader.serve([ports[1], ports[0]])
+    before.write(0, at(0.1))  # meant for the tool
+    reader.take()
+    assert ports[0].heard == ports[1].heard == []
+    assert not before.in_force
+    after = SlotWriter(shared, reversed(PORTS))
+    assert after.in_force
+    after.write(0, at(0.2))
+    reader.take()
+    assert len(ports[1].heard) == 1
+
+
+def test_lists_are_told_apart_by_names_kinds_and_order() -> None:
+    lists = [PORTS, PORTS[::-1], PORTS[:1], [("tool", "force"), PORTS[1]], [], [(BALL.name, BALL.kind)]]
+    numbers = [list_of(each) for each in lists]
+    assert len(set(numbers)) == len(lists)
+    assert 0 not in numbers
+
+
+def test_every_port_that_a_scene_can_have_has_a_slot_of_its_own(shared: SharedMemory) -> None:
+    ports = [HeardPort(TOOL) for _ in range(MOST_PORTS)]
+    reader = SlotReader(shared)
+    reader.serve(ports)
+    writer = SlotWriter(shared, ((port.name, port.kind) for port in ports))
+    records = bytes(shared.record_area)
+    for index in range(MOST_PORTS):
+        writer.write(index, at(float(index), seq=index))
+    reader.take()
+    assert [[update.seq for update in port.heard] for port in ports] == [[index] for index in range(MOST_PORTS)]
+    assert bytes(shared.record_area) == records
+    assert len(shared.remote) == MOST_PORTS * SLOT_BYTES
+
+
+def test_no_update_is_torn_while_another_process_writes_as_fast_as_it_can_and_is_killed(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HAMMER, str(shared.descriptor)], pass_fds=[shared.descriptor], stdout=subprocess.PIPE
+    ) as hammer:
+        assert hammer.stdout is not None
+        hammer.stdout.readline()
+        while min(len(port.heard) for port in ports) < 300:
+            reader.take()
+        os.kill(hammer.pid, signal.SIGKILL)
+    SlotWriter(shared, PORTS)
+    reader.take()
+    assert reader.seen == shared.words[REMOTE]
+    for parity, port in enumerate(ports):
+        for update in port.heard:
+            vectors = (update.position_m, update.velocity_m_per_s, update.angular_velocity_rad_per_s, update.force_n)
+            numbers = {number for vector in (*vectors, update.orientation) for number in vector}
+            numbers |= {update.stiffness_n_per_m, update.damping_n_s_per_m, update.said, update.sent_ns}
+            assert numbers == {update.seq}
+            assert update.seq % 2 == parity
+        seqs = [update.seq for update in port.heard]
+        assert seqs == sorted(set(seqs))
