@@ -16,6 +16,7 @@ from hapticd.client.commands import RefusedConfigError, RefusedError
 from hapticd.client.connection import Client
 from hapticd.client.daemon import DaemonClient, connect
 from hapticd.client.decode import decode
+from hapticd.client.remote import DrivenState, RemotePort, RemoteState
 from hapticd.errors import ClientError, InstanceError, SchemaError, SilenceError, WireError
 from hapticd.keys.client import RefusedKeyError
 from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Status, Timing, Touch
@@ -27,6 +28,7 @@ __all__ = [
     "Cycle",
     "DaemonClient",
     "Damping",
+    "DrivenState",
     "Energy",
     "Event",
     "EventCode",
@@ -38,6 +40,8 @@ __all__ = [
     "RefusedConfigError",
     "RefusedError",
     "RefusedKeyError",
+    "RemotePort",
+    "RemoteState",
     "SchemaError",
     "SilenceError",
     "Status",

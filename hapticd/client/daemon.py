@@ -9,8 +9,9 @@ from typing import Any
 
 from hapticd.client.commands import TIMEOUT_S, calibrate, command
 from hapticd.client.connection import Client
+from hapticd.client.remote import RemotePort
 from hapticd.errors import ClientError, SilenceError
-from hapticd.paths import DEFAULT_INSTANCE
+from hapticd.paths import DEFAULT_INSTANCE, SCENE, STATE, locate
 from hapticd.telemetry.records import Sent, Status
 from hapticd.telemetry.wire import Topic
 
@@ -79,6 +80,7 @@ class DaemonClient(Client):
         self._instance = instance
         self._control = control
         self._keys = Path(keys) if keys is not None else None
+        self._is_local = telemetry is None
         self._may_command = control is not None or telemetry is None
         try:
             self._join()
@@ -146,6 +148,34 @@ class DaemonClient(Client):
             RefusedConfigError: the file cannot be used, and nothing has changed; the message names every problem.
         """
         self._ask("reload", wait=True)
+
+    def remote(self, name: str, *, scene: str | None = None, state: str | None = None) -> RemotePort:
+        """Drive an object, a coupling or a force of the scene; to be used in a `with`.
+
+        Args:
+            name: of it, as the configuration has it.
+            scene: of a daemon elsewhere, its `remote.scene_tcp` as seen from here.
+            state: of a daemon elsewhere, its `remote.state_tcp` as seen from here.
+
+        Raises:
+            ClientError: the scene has no such name, or a daemon elsewhere was named without these endpoints.
+            RefusedKeyError: the daemon does not list this key, or it may only watch.
+            SchemaError: the daemon speaks another version of the protocol.
+            SilenceError: the daemon does not answer any more.
+        """
+        names = self.status().remote_name
+        if name not in names:
+            there = f"there is {', '.join(names)}" if names else "nothing in it is for clients to drive"
+            raise ClientError(f'{self.endpoint}: no "{name}" in the scene: {there}')
+        if scene is None or state is None:
+            if not self._is_local:
+                raise ClientError(
+                    f"{self.endpoint}: on another computer name where clients of the scene come in, its "
+                    'remote.scene_tcp and remote.state_tcp: scene="tcp://HOST:PORT", state="tcp://HOST:PORT"'
+                )
+            scene = f"ipc://{locate(SCENE, self._instance)}"
+            state = f"ipc://{locate(STATE, self._instance)}"
+        return RemotePort(name, scene, state, self._keys)
 
     def stop(self) -> None:
         """Have the daemon ramp the force out and end. As a service it stays off until it is started again."""

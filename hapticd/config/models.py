@@ -134,7 +134,25 @@ class ControlConfig(Table):
 
 
 class RemoteConfig(RemoteLawTable):
-    """[remote]: what other programs drive in the scene."""
+    """[remote]: what other programs drive in the scene, and where they come in besides the instance's own sockets."""
+
+    scene_tcp: str | None = Field(
+        None,
+        description="TCP endpoint for what they say, for `hapticd keys` only, such as tcp://0.0.0.0:9874; unset: none",
+    )
+    state_tcp: str | None = Field(
+        None,
+        description="TCP endpoint for what they are told each tick, for `hapticd keys` only, such as "
+        "tcp://0.0.0.0:9875; unset: none",
+    )
+    lease_s: float = Field(
+        1.0, ge=0.1, le=60.0, description="how long a client that says nothing keeps the name that it drives [s]"
+    )
+
+    @field_validator("scene_tcp", "state_tcp")
+    @classmethod
+    def _is_endpoint(cls, endpoint: str | None) -> str | None:
+        return _tcp_endpoint(endpoint, 9874)
 
 
 class ServiceConfig(Table):

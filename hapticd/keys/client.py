@@ -113,12 +113,16 @@ class CurveClient:
             elif left_s <= 0.0:
                 return False
 
-    def close(self) -> None:
-        """Close the socket. May be called twice."""
+    def close(self, last_words_ms: int = 0) -> None:
+        """Close the socket. May be called twice.
+
+        Args:
+            last_words_ms: how long what was sent may take to leave [ms].
+        """
         if not self._socket.closed:
             self._socket.disable_monitor()
         self._news.close(0)
-        self._socket.close(0)
+        self._socket.close(last_words_ms)
 
     def _learn(self, event: int, value: int) -> None:
         if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:

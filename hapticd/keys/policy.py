@@ -23,20 +23,22 @@ def stays_here(endpoint: str) -> bool:
 def tcp_endpoints(config: Config) -> dict[str, str]:
     """The endpoints that a configuration opens, by the key that names them in the file."""
     named = {"telemetry.tcp": config.telemetry.tcp, "control.tcp": config.control.tcp}
+    if config.scene.couplings or config.scene.forces or any(each.remote for each in config.scene.objects):
+        named |= {"remote.scene_tcp": config.remote.scene_tcp, "remote.state_tcp": config.remote.state_tcp}
     return {name: endpoint for name, endpoint in named.items() if endpoint is not None}
 
 
 def takes_keys(name: str, endpoint: str) -> bool:
     """Whether a TCP endpoint admits listed keys only.
 
-    Measurements leave this computer with keys only; commands over TCP take them on this computer too, since every
+    Measurements leave this computer with keys only; what drives a device takes them on this computer too, since every
     program of every user reaches a port.
 
     Args:
-        name: `telemetry.tcp` or `control.tcp`.
+        name: of the key in the file, such as `telemetry.tcp`.
         endpoint: its address.
     """
-    return name == "control.tcp" or not stays_here(endpoint)
+    return name != "telemetry.tcp" or not stays_here(endpoint)
 
 
 def key_ring(loaded: LoadedConfig) -> KeyRing | None:

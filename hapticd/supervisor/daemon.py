@@ -19,6 +19,7 @@ from hapticd.supervisor.force_release import ForceRelease
 from hapticd.supervisor.lock import InstanceLock
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.reload import Reload
+from hapticd.supervisor.remote_process import RemoteProcess
 from hapticd.supervisor.request_queue import RequestQueue
 from hapticd.supervisor.state import DaemonState
 from hapticd.supervisor.status import StatusBuilder
@@ -79,6 +80,9 @@ class Daemon:
             undo.callback(self.lock.close)
             self.release = ForceRelease(config)
             undo.callback(self.release.close)
+            remote = RemoteProcess(self.lock.directory)
+            undo.callback(remote.close)
+            remote.prepare(config)
             start = LoopStart(config, wait=True)  # both import what they need at the same time
             with contextlib.ExitStack() as on_the_way:
                 on_the_way.callback(start.end)
@@ -92,6 +96,8 @@ class Daemon:
             undo.callback(publisher.close)
             commands = CommandSocket(self.lock.directory / CONTROL, config.config.control.tcp, ring)
             undo.callback(commands.close)
+            remote.serve(config, loop, ring, offset_ns)
+            remote.wait_ready()
             status = StatusBuilder(instance, offset_ns, config.path.absolute())
             event_log = EventLog(instance, publisher, status, fault_directory(instance), offset_ns)
             self.state = DaemonState(
@@ -101,6 +107,9 @@ class Daemon:
                 recovery=Recovery(),
                 publisher=publisher,
                 commands=commands,
+                remote=remote,
+                ring=ring,
+                epoch_offset_ns=offset_ns,
                 status=status,
                 event_log=event_log,
                 notifier=Notifier(),
@@ -196,6 +205,8 @@ class Daemon:
         if state.stop_reason:
             self.stop(state.stop_reason)
         self._reload.turn()
+        for text in state.remote.turn():
+            state.tell(EventCode.REMOTE_LOST, text)
         state.requests.turn(state.loop.reader.fetched)
         state.event_log.turn(state.config, state.loop)
         if now_s >= state.status_due_s:
@@ -310,7 +321,13 @@ class Daemon:
         state = self.state
         written = state.event_log.recorder.written
         status = state.status.make(
-            state.config, state.loop, state.recovery, written, state.commands.refused, self._problem
+            state.config,
+            state.loop,
+            state.recovery,
+            written,
+            state.commands.refused,
+            self._problem,
+            state.remote.counts,
         )
         state.publisher.status(status.as_map())
         doing = f"no device: {state.recovery.why}" if state.recovery.lost else f"{state.status.rate_hz:.0f} Hz"

@@ -11,6 +11,7 @@ from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.commands import CommandSocket
 from hapticd.supervisor.events import EventLog
 from hapticd.supervisor.recovery import Recovery
+from hapticd.supervisor.remote_process import RemoteProcess
 from hapticd.supervisor.request_queue import Answer, RequestQueue
 from hapticd.supervisor.status import StatusBuilder
 from hapticd.supervisor.systemd import Notifier
@@ -29,6 +30,9 @@ class DaemonState:
         recovery: looks for a device that is lost.
         publisher: telemetry.
         commands: the control socket.
+        remote: the process that hears clients of the scene.
+        ring: the keys that TCP endpoints take.
+        epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
         status: counts, and the status made of them.
         event_log: tells of events.
         notifier: tells systemd.
@@ -43,6 +47,9 @@ class DaemonState:
     recovery: Recovery
     publisher: Publisher
     commands: CommandSocket
+    remote: RemoteProcess
+    ring: KeyRing | None
+    epoch_offset_ns: int
     status: StatusBuilder
     event_log: EventLog
     notifier: Notifier
@@ -67,19 +74,28 @@ class DaemonState:
         if ring is not None:
             self.publisher.admit(ring)
             self.commands.admit(ring)
+            self.ring = ring
+        self.serve_clients()
         self.status_due_s = 0.0
+
+    def serve_clients(self) -> None:
+        """Have clients drive what the scene has for them, with the loop that there is."""
+        self.remote.serve(self.config, self.loop, self.ring, self.epoch_offset_ns)
 
     def follow_clock(self, epoch_offset_ns: int) -> None:
         """Go on with another difference between CLOCK_MONOTONIC and the time of day."""
+        self.epoch_offset_ns = epoch_offset_ns
         self.publisher.follow_clock(epoch_offset_ns)
         self.status.follow_clock(epoch_offset_ns)
         self.event_log.follow_clock(epoch_offset_ns)
+        self.serve_clients()
 
     def take_loop(self, loop: LoopProcess) -> None:
         """Go on with the loop that has found the device again."""
         self.loop.close()
         self.loop = loop
         self.requests = RequestQueue(loop.shared)
+        self.serve_clients()
         self.status.expect(self.recovery.resume)
         away_s = time.monotonic() - self.recovery.lost_s
         self.tell(EventCode.DEVICE_FOUND, f"the device is back after {away_s:.1f} s", away_s=away_s)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.safety import SafetyConfig
@@ -110,6 +111,7 @@ class StatusBuilder:
         fault_records: int,
         requests_refused: int,
         problem: str,
+        remote: Mapping[str, Any],
     ) -> Status:
         """The status as it is now.
 
@@ -120,6 +122,7 @@ class StatusBuilder:
             fault_records: written so far.
             requests_refused: on the control socket so far.
             problem: what stands and should be known, a line; "" when there is nothing.
+            remote: what the remote process counted, by the fields of the status.
         """
         self._measure_rate()
         settings = config.config
@@ -165,6 +168,7 @@ class StatusBuilder:
             object_shape=tuple(one.shape for one in settings.scene.objects),
             object_position_m=tuple(at_m for one in settings.scene.objects for at_m in one.position_m),
             object_stiffness_n_per_m=tuple(one.stiffness_n_per_m for one in settings.scene.objects),
+            **remote,
             config_file=str(self._file),
             config_hash=config.hash,
             realtime=loop.realtime,

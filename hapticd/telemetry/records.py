@@ -330,6 +330,17 @@ class Status:
         object_shape: its shape.
         object_position_m: where it is, three numbers an object [m].
         object_stiffness_n_per_m: its stiffness [N/m].
+        remote_name: name of each object, coupling and force that clients may drive, in that order.
+        remote_kind: `object`, `coupling` or `force`.
+        remote_owner: the client that it belongs to now; "" when to none.
+        remote_messages: messages of clients that were taken for it.
+        remote_refused: messages that were refused: wrong in themselves, or of another client than its owner.
+        remote_late: messages that came behind a newer one and were passed over.
+        remote_age_histogram: messages by how long after their sending a tick was done with them; bins of
+            `hapticd.remote.delays.DELAY_EDGES_MS`, one name after the other.
+        remote_round_trip_histogram: messages by how long after the tick that they answer they were in force; the same
+            bins.
+        remote_strays: messages that made no sense or named nothing that the scene has.
         config_file: the file that is in force.
         config_hash: of its content.
         realtime: scheduling and memory are as the loop needs them.
@@ -386,6 +397,15 @@ class Status:
     object_shape: tuple[str, ...] = ()
     object_position_m: tuple[float, ...] = ()
     object_stiffness_n_per_m: tuple[float, ...] = ()
+    remote_name: tuple[str, ...] = ()
+    remote_kind: tuple[str, ...] = ()
+    remote_owner: tuple[str, ...] = ()
+    remote_messages: tuple[int, ...] = ()
+    remote_refused: tuple[int, ...] = ()
+    remote_late: tuple[int, ...] = ()
+    remote_age_histogram: tuple[int, ...] = ()
+    remote_round_trip_histogram: tuple[int, ...] = ()
+    remote_strays: int = 0
     config_file: str = ""
     config_hash: str = ""
     realtime: bool = False

@@ -17,7 +17,12 @@ from hapticd.tick.motion import FROZEN_S, FROZEN_SAMPLES
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "faults.md").read_text()
-PLACES = ("daemon/test_faults.py", "daemon/test_deaths.py", "drivers/forcedimension/test_daemon.py")
+PLACES = (
+    "daemon/test_faults.py",
+    "daemon/test_deaths.py",
+    "drivers/forcedimension/test_daemon.py",
+    "remote/test_daemon.py",
+)
 PROVOKED = "".join((ROOT / "tests" / place).read_text() for place in PLACES)
 ROWS = re.findall(r"^\| (\d+) \| (\w+) \| (.+) \|$", PAGE, flags=re.MULTILINE)
 

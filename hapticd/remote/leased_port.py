@@ -1,0 +1,142 @@
+"""A port with the client that owns it, and what was counted of it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hapticd.config.ports import PortLimits
+from hapticd.remote.delays import DelayHistogram
+from hapticd.remote.message import LARGEST_NUMBER, examine, merge
+from hapticd.tick.remote.update import RELEASED, Update
+
+_LONGEST_DELAY_NS = 10_000_000_000  # a client that says that it sent a message earlier has another clock
+_REMEMBERED = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Sender:
+    """Who has sent a message.
+
+    Attributes:
+        identity: of its connection, as ZeroMQ has it.
+        descriptor: of its connection.
+        local: it is on this computer, so that its CLOCK_MONOTONIC is ours.
+        name: for people.
+    """
+
+    identity: bytes
+    descriptor: int
+    local: bool
+    name: str
+
+
+class NotTakenError(Exception):
+    """A message that is not for its sender to send."""
+
+
+class LeasedPort:
+    """A port of the scene.
+
+    Args:
+        limits: what it is.
+        lease_s: how long a client that says nothing keeps it [s].
+
+    Attributes:
+        limits: what it is.
+        update: all that its owner has said.
+        owner: the client that it belongs to; None: to none.
+        messages: taken.
+        late: messages that came behind a newer one and were passed over.
+        refused: messages that were not taken.
+        ages: from a message's sending to the end of the tick that it was first in force at.
+        round_trips: from the tick whose state a message answers to the tick that it was first in force at.
+    """
+
+    def __init__(self, limits: PortLimits, lease_s: float) -> None:
+        self.limits = limits
+        self.update = Update()
+        self.owner: Sender | None = None
+        self.messages = 0
+        self.late = 0
+        self.refused = 0
+        self.ages = DelayHistogram()
+        self.round_trips = DelayHistogram()
+        self._lease_ns = round(lease_s * 1e9)
+        self._under_way: deque[tuple[int, int, int]] = deque(maxlen=_REMEMBERED)
+        self._in_force = -1
+
+    def owner_at(self, now_ns: int) -> Sender | None:
+        """Whom the port belongs to now."""
+        if self.owner is not None and now_ns - self.update.received_ns > self._lease_ns:
+            self.owner = None
+        return self.owner
+
+    def take(self, fields: Mapping[str, Any], sender: Sender, axes: int, now_ns: int) -> bool:
+        """Take a message; whether there is something new for the loop.
+
+        Args:
+            fields: the message.
+            sender: who sent it; a port without an owner is its from now on.
+            axes: of the device.
+            now_ns: CLOCK_MONOTONIC [ns].
+
+        Raises:
+            NotTakenError: the port belongs to another client.
+            WrongMessageError: something in it cannot be.
+        """
+        owner = self.owner_at(now_ns)
+        if owner is not None and owner.identity != sender.identity:
+            raise NotTakenError(
+                f"{self.limits.name} belongs to {owner.name}, until it lets go or is silent for "
+                f"{self._lease_ns * 1e-9:g} s"
+            )
+        if fields.get("release") is True:
+            return self._release(now_ns)
+        said = examine(fields, self.limits, axes)
+        if owner is None:
+            self.update = Update()
+            self._under_way.clear()
+        self.owner = sender  # who has another connection by now, perhaps
+        self.update.received_ns = now_ns  # a message that is late shows that its sender lives
+        if said.seq <= self.update.seq:
+            self.late += 1
+            return False
+        merge(said, self.update)
+        known = sender.local and said.sent_ns and 0 <= now_ns - said.sent_ns <= _LONGEST_DELAY_NS
+        self.update.sent_ns = said.sent_ns if known else 0
+        self.messages += 1
+        self._under_way.append((said.seq, self.update.sent_ns or now_ns, said.state_seq))
+        return True
+
+    def now_in_force(self, seq: int, tick: int, done_ns: int, period_ns: int) -> None:
+        """Learn which message a tick was done with.
+
+        Args:
+            seq: the client's number of it.
+            tick: number of the tick.
+            done_ns: when the tick was done [ns of CLOCK_MONOTONIC].
+            period_ns: between ticks [ns].
+        """
+        if seq == self._in_force:
+            return
+        self._in_force = seq
+        while self._under_way and self._under_way[0][0] <= seq:
+            number, sent_ns, state_seq = self._under_way.popleft()
+            if number == seq:
+                self.ages.add(done_ns - sent_ns)
+                if 0 <= state_seq <= tick:
+                    self.round_trips.add((tick - state_seq) * period_ns)
+
+    def _release(self, now_ns: int) -> bool:
+        if self.owner is None:
+            return False
+        self.owner = None
+        self._under_way.clear()
+        self.update.said |= RELEASED
+        self.update.seq = min(self.update.seq + 1, LARGEST_NUMBER)
+        self.update.received_ns = now_ns
+        self.update.sent_ns = 0
+        return True

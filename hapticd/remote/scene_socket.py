@@ -1,0 +1,214 @@
+"""What clients say of the scene: a ROUTER, with a lease a name and a bound on everything.
+
+A message is one msgpack map. What is refused is counted and answered, once a second a client at most, and nothing that
+arrives can raise.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import zmq
+
+from hapticd.config.ports import PortLimits
+from hapticd.keys.store import KeyRing
+from hapticd.loop.remote_slots import SlotWriter
+from hapticd.remote.bound_socket import BoundSocket
+from hapticd.remote.leased_port import LeasedPort, NotTakenError, Sender
+from hapticd.remote.message import WrongMessageError
+
+SCHEMA = 1
+"""Version of what scene and state sockets speak; goes up only when a key changes its meaning or goes."""
+
+MOST_AT_ONCE = 50
+"""Messages of a turn: behind them a tick may wait to be told."""
+
+_LARGEST_MESSAGE = 1 << 12  # bytes
+_MOST_UNREAD = 100  # messages of a client
+_ANSWER_NS = 1_000_000_000
+_MOST_ANSWERED = 512  # clients whose last answer is remembered
+
+
+class SceneSocket:
+    """The scene socket.
+
+    Args:
+        path: where it lies.
+        tcp: its TCP endpoint; None for none.
+        ring: the keys that this takes.
+
+    Attributes:
+        ports: by their names, in the order of the scene.
+        strays: messages that made no sense or named no port.
+        descriptor: readable when something may have come; only then, so look before waiting for it.
+
+    Raises:
+        InstanceError: it cannot be bound.
+    """
+
+    def __init__(self, path: Path, tcp: str | None, ring: KeyRing | None) -> None:
+        self.ports: dict[str, LeasedPort] = {}
+        self.strays = 0
+        self._bound = BoundSocket(
+            zmq.ROUTER,
+            path,
+            None if tcp is None else (tcp, "remote.scene_tcp"),
+            ring,
+            watch_only=False,
+            largest=_LARGEST_MESSAGE,
+            unread=_MOST_UNREAD,
+            # A client that lost its connection and says who it is has its name back at once.
+            options={zmq.ROUTER_HANDOVER: 1},
+        )
+        self.descriptor = int(self._bound.socket.getsockopt(zmq.FD))
+        self._slots: dict[str, int] = {}
+        self._writer: SlotWriter | None = None
+        self._axes: tuple[str, ...] = ()
+        self._hello: dict[str, Any] = {}
+        self._answered_ns: dict[bytes, int] = {}
+
+    def serve(
+        self, limits: Sequence[PortLimits], writer: SlotWriter, lease_s: float, axes: tuple[str, ...], rate_hz: float
+    ) -> None:
+        """Go on with these ports; one that was there keeps its owner and what was said.
+
+        Args:
+            limits: the ports, in the order of the scene.
+            writer: where to hand on what is said.
+            lease_s: how long a client that says nothing keeps a name [s].
+            axes: of the device.
+            rate_hz: ticks a second [Hz].
+        """
+        before = self.ports
+        self.ports = {}
+        for each in limits:
+            port = before.get(each.name)
+            if port is None or port.limits.kind != each.kind:
+                port = LeasedPort(each, lease_s)
+            port.limits = each
+            self.ports[each.name] = port
+        self._slots = {each.name: index for index, each in enumerate(limits)}
+        self._writer = writer
+        self._axes = axes
+        self._hello = {
+            "ok": True,
+            "schema": SCHEMA,
+            "rate_hz": rate_hz,
+            "axes": list(axes),
+            "lease_s": lease_s,
+            "ports": [asdict(each) for each in limits],
+        }
+
+    def admit(self, ring: KeyRing | None) -> None:
+        """Take other keys over."""
+        self._bound.admit(ring)
+
+    def turn(self) -> None:
+        """Let those in who have a key. Returns at once."""
+        self._bound.turn()
+
+    def receive(self) -> bool:
+        """Take what has come, at most `MOST_AT_ONCE` messages; whether more may wait."""
+        for _ in range(MOST_AT_ONCE):
+            if not self._bound.waits():
+                return False
+            try:
+                who, *frames = self._bound.socket.recv_multipart(zmq.NOBLOCK, copy=False)
+            except zmq.Again:
+                return False
+            self._take(who.bytes, frames)
+        return True
+
+    def close(self) -> None:
+        """Let go of the path."""
+        self._bound.close()
+
+    def _take(self, identity: bytes, frames: Sequence[zmq.Frame]) -> None:
+        now_ns = time.monotonic_ns()
+        fields = _decoded(frames)
+        if fields is None:
+            self.strays += 1
+            self._bound.connections.odd(int(frames[-1].get(zmq.SRCFD)) if frames else -1)
+            self._refuse(identity, "", "a message is one msgpack map with texts as keys", now_ns)
+            return
+        descriptor = int(frames[0].get(zmq.SRCFD))
+        self._bound.connections.heard(descriptor)
+        if "hello" in fields:
+            self._send(identity, self._hello)
+            return
+        name = fields.get("name")
+        port = self.ports.get(name) if isinstance(name, str) else None
+        if port is None:
+            self.strays += 1
+            known = ", ".join(self.ports) or "nothing"
+            self._refuse(identity, str(name)[:40], f"no such name in the scene; there is {known}", now_ns)
+            return
+        try:
+            if port.take(fields, self._sender(port, identity, descriptor, frames[0]), len(self._axes), now_ns):
+                self._write(port)
+        except (NotTakenError, WrongMessageError) as error:
+            port.refused += 1
+            self._refuse(identity, port.limits.name, str(error), now_ns)
+
+    def _sender(self, port: LeasedPort, identity: bytes, descriptor: int, frame: zmq.Frame) -> Sender:
+        """Who sent a message; looked up only where it is not the owner of its port, whom we know.
+
+        An owner whose connection is another one's by now, or is closed, has gone, and so has its lease.
+        """
+        owner = port.owner
+        if owner is not None and owner.identity == identity and owner.descriptor == descriptor:
+            return owner
+        if (
+            owner is not None
+            and owner.identity != identity
+            and (owner.descriptor == descriptor or _closed(owner.descriptor))
+        ):
+            port.owner = None
+        local, name = self._bound.peer(frame)
+        return Sender(identity, descriptor, local, name)
+
+    def _write(self, port: LeasedPort) -> None:
+        assert self._writer is not None
+        self._writer.write(self._slots[port.limits.name], port.update)
+
+    def _refuse(self, identity: bytes, name: str, text: str, now_ns: int) -> None:
+        """Say why not, unless this client was told something a moment ago."""
+        if now_ns - self._answered_ns.get(identity, -_ANSWER_NS) < _ANSWER_NS:
+            return
+        self._answered_ns.pop(identity, None)
+        self._answered_ns[identity] = now_ns
+        if len(self._answered_ns) > _MOST_ANSWERED:
+            del self._answered_ns[next(iter(self._answered_ns))]
+        self._send(identity, {"ok": False, "name": name, "text": text})
+
+    def _send(self, identity: bytes, answer: Mapping[str, Any]) -> None:
+        with contextlib.suppress(zmq.ZMQError):  # who is answered has gone
+            self._bound.socket.send_multipart((identity, msgpack.packb(answer)), zmq.NOBLOCK)
+
+
+def _closed(descriptor: int) -> bool:
+    try:
+        os.fstat(descriptor)
+    except OSError:
+        return True
+    return False
+
+
+def _decoded(frames: Sequence[zmq.Frame]) -> dict[str, Any] | None:
+    """The map in these frames; None when there is none."""
+    if len(frames) != 1:
+        return None
+    try:
+        said = msgpack.unpackb(frames[0].bytes)
+    except Exception:  # noqa: BLE001 - msgpack has many ways to say that bytes make no sense
+        return None
+    if not isinstance(said, dict) or not all(isinstance(key, str) for key in said):
+        return None
+    return said

@@ -1,0 +1,196 @@
+"""Real clients of a real daemon: driven, told, bounded; killed, stopped, replaced, hostile."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import signal
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+
+import msgpack
+import pytest
+import zmq
+
+from hapticd.client import RefusedError, RemotePort
+from hapticd.remote.state_map import ports_of
+from hapticd.tick.event import EventCode
+from hapticd.tick.remote.port_state import PortState
+from tests.daemon.running import Daemon, Subscriber, all_records, gone, wait_until
+from tests.remote.stage import (
+    CONFIG,
+    MAX_FORCE_N,
+    driven,
+    hold,
+    other_client,
+    remote_pid,
+    runtime,
+)
+
+LARGEST_STEP_N = 0.5
+"""From one tick to the next; the limit let go at once would be six times that."""
+
+
+@pytest.fixture(scope="module")
+def daemon() -> Iterator[Daemon]:
+    with Daemon(CONFIG) as daemon:
+        yield daemon.wait_ready()
+
+
+@pytest.fixture
+def tool(daemon: Daemon) -> Iterator[RemotePort]:
+    with driven(daemon) as tool:
+        yield tool
+
+
+def test_a_target_is_followed_and_the_client_learns_from_which_tick_on(tool: RemotePort) -> None:
+    assert (tool.kind, tool.axes, tool.limits["max_force_n"]) == ("coupling", ("x",), MAX_FORCE_N)
+    hold(tool, 0.01, 400)
+    state = tool.state()
+    assert state.armed
+    assert state.port is not None
+    assert state.port.state == "held"
+    assert state.port.seq == tool.seq
+    assert state.port.target_m == pytest.approx((0.01,), abs=1e-4)
+    assert state.position_m == pytest.approx((0.01,), abs=1e-3), "a hand that only damps is drawn along"
+    assert state.ports["tool"] == state.port
+    tool.change(stiffness_n_per_m=100.0)
+    sent = tool.seq
+    wait_until(lambda: (port := tool.state().port) is not None and port.seq >= sent, "the change to be in force")
+
+
+def test_the_mean_force_is_that_of_the_ticks_in_between_whatever_was_lost(daemon: Daemon, tool: RemotePort) -> None:
+    hold(tool, -0.01)
+    tool.mean_force_n()
+    first = tool._newest
+    for _ in range(20):  # 10 ms without listening: most states are lost
+        tool.move([-0.01])
+        time.sleep(0.01)
+    mean_n = tool.mean_force_n()
+    last = tool._newest
+    assert first is not None
+    assert last is not None
+    assert last.seq > first.seq + 100
+    memory = daemon.memory()
+    between = [record for record in all_records(memory) if first.seq < record.seq <= last.seq]
+    memory.close()
+    # Of one axis and one coupling the force on the device is the coupling's, held from each tick to the next.
+    held_n = [record.force_n[0] for record in between]
+    assert len(between) > 0.9 * (last.seq - first.seq)
+    assert mean_n[0] == pytest.approx(sum(held_n) / len(held_n), abs=0.05 * MAX_FORCE_N)
+
+
+def test_a_client_that_is_killed_is_told_once_let_go_without_a_step_and_replaced(daemon: Daemon) -> None:
+    with Subscriber(daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber, driven(daemon) as other:
+        subscriber.until("hapticd/status")
+        with other_client(daemon, 0.02) as client:
+            wait_until(lambda: other.state().ports["tool"].state == "held", "the other client to be in force")
+            killed_tick = other.state().seq + 1100  # what was told of a moment ago is not told again
+            wait_until(lambda: other.state().seq >= killed_tick, "a second without news")
+            client.kill()
+            stale = subscriber.until("hapticd/event", code=EventCode.REMOTE_STALE)
+        assert stale["name"] == "tool"
+        assert stale["seq"] < killed_tick + 1000
+        wait_until(lambda: other.state().ports["tool"].force_n == (0.0,), "the force to be out")
+        out_tick = other.state().seq
+        memory = daemon.memory()
+        after = [record.force_n[0] for record in all_records(memory) if record.seq >= killed_tick]
+        memory.close()
+        assert max(abs(b - a) for a, b in pairwise(after)) < LARGEST_STEP_N
+        hold(other, 0.0)  # at once: whose connection has ended has no lease
+        back = subscriber.until("hapticd/event", code=EventCode.REMOTE_BACK)
+        assert back["seq"] >= out_tick - 1
+
+
+def test_a_client_that_is_stopped_keeps_its_name_for_the_lease_and_then_loses_it(daemon: Daemon) -> None:
+    with driven(daemon) as other, other_client(daemon) as client:
+        wait_until(lambda: other.state().ports["tool"].state == "held", "the other client to be in force")
+        os.kill(client.pid, signal.SIGSTOP)
+        wait_until(lambda: other.state().ports["tool"].state == "stale", "it to be let go")
+        other.move([0.0])
+        with pytest.raises(RefusedError, match=f"tool belongs to user .*, process {client.pid}, until"):
+            hold(other, 0.0)
+        end_s = time.monotonic() + 20.0
+        while other.state().ports["tool"].seq != other.seq:
+            assert time.monotonic() < end_s
+            try:
+                other.move([0.0])
+            except RefusedError:
+                continue
+        os.kill(client.pid, signal.SIGCONT)
+        for _ in range(300):
+            assert other.state().ports["tool"].state == "held"
+            other.move([0.0])
+        with Subscriber(daemon.endpoint, "hapticd/status") as subscriber:
+            status = subscriber.until("hapticd/status", remote_owner=[f"user {os.getuid()}, process {os.getpid()}"])
+        assert status["remote_refused"][0] > 0
+
+
+def test_nothing_hostile_gets_in_or_holds_the_loop_up(daemon: Daemon, tool: RemotePort) -> None:
+    """Of another client NaN, too much and what makes no sense, ten thousand of them; of the owner jumps of 1 m."""
+    hostile = itertools.cycle(
+        msgpack.packb(fields)
+        for fields in [
+            {"name": "nothing", "seq": 1},
+            {"name": "tool", "seq": 1 << 40, "position_m": [math.nan]},
+            {"name": "tool", "seq": 1 << 40, "position_m": [0.5], "stiffness_n_per_m": 1e9},
+            {"name": "tool", "seq": 1 << 40, "release": True},
+        ]
+    )
+    hold(tool, 0.0)
+    first = tool.state()
+    context = zmq.Context()
+    flood = context.socket(zmq.DEALER)
+    flood.setsockopt(zmq.SNDHWM, 0)
+    flood.connect(f"ipc://{runtime(daemon)}/scene")
+    for turn in range(200):
+        for _ in range(50):
+            flood.send(next(hostile))
+        tool.state()
+        with contextlib.suppress(RefusedError):  # of the NaN before
+            tool.move([math.nan if turn % 10 == 9 else 0.5 if turn % 2 else -0.5])
+    wait_until(lambda: refused(daemon) >= 0.7 * 200 * 50, "the flood to have been heard")
+    while True:
+        with contextlib.suppress(RefusedError):
+            hold(tool, 0.0)
+            break
+    last = tool.state()
+    context.destroy(0)
+    assert last.port is not None
+    assert last.port.state == "held"
+    memory = daemon.memory()
+    records = [record for record in all_records(memory) if first.seq < record.seq <= last.seq]
+    memory.close()
+    assert max(abs(record.force_n[0]) for record in records) <= MAX_FORCE_N + 1e-9
+    assert all(port.seq <= tool.seq for record in records for port in ports_of(record)), (
+        "none of the flood was in force"
+    )
+
+
+def refused(daemon: Daemon) -> int:
+    with Subscriber(daemon.endpoint, "hapticd/status") as subscriber:
+        status = subscriber.until("hapticd/status")
+    return int(status["remote_refused"][0])
+
+
+def test_a_killed_process_is_started_again_and_a_client_goes_on_by_itself(daemon: Daemon, tool: RemotePort) -> None:
+    with Subscriber(daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")
+        hold(tool, 0.005)
+        before = remote_pid(daemon)
+        os.kill(before, signal.SIGKILL)
+        lost = subscriber.until("hapticd/event", code=EventCode.REMOTE_LOST)
+        assert "was killed by signal 9; it is started again" in lost["text"]
+        wait_until(lambda: remote_pid(daemon) not in (0, before), "another process")
+        hold(tool, 0.005)
+    assert gone(before)
+    memory = daemon.memory()
+    records = [record for record in all_records(memory) if record.seq >= lost["seq"] - 100]
+    memory.close()
+    states = [port.state for record in records for port in ports_of(record)]
+    assert PortState.STALE in states
+    assert states[-1] == PortState.HELD
+    assert max(abs(record.force_n[0]) for record in records) <= MAX_FORCE_N + 1e-9

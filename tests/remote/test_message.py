@@ -1,0 +1,125 @@
+"""What is let in is finite and within the limits; of what is refused, nothing is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticd.config.ports import PortLimits
+from hapticd.remote.message import WrongMessageError, examine, merge
+from hapticd.tick.remote.update import (
+    FORCE,
+    ORIENTATION,
+    POSITION,
+    RELEASED,
+    STIFFNESS,
+    TURNING,
+    VELOCITY,
+    Update,
+)
+from tests.examples import examples
+from tests.remote.heard import BALL, FIELD, TOOL, copied
+
+KEYS = (
+    "position_m", "velocity_m_per_s", "force_n", "orientation", "angular_velocity_rad_per_s", "stiffness_n_per_m",
+    "damping_n_s_per_m", "seq", "sent_ns", "state_seq", "name", "position", "\x00",
+)  # fmt: skip
+NUMBERS = st.one_of(st.floats(), st.integers(-(2**63), 2**64 - 1))
+VALUES = st.one_of(
+    NUMBERS, st.lists(NUMBERS, max_size=5), st.none(), st.booleans(), st.text(max_size=3), st.lists(st.none())
+)
+
+
+def said_all(update: Update) -> list[object]:
+    return [getattr(update, name) for name in Update.__slots__]
+
+
+def taken(port: PortLimits, axes: int = 1, **fields: Any) -> Update:
+    update = Update()
+    merge(examine({"seq": 1, **fields}, port, axes), update)
+    return update
+
+
+@given(fields=st.dictionaries(st.sampled_from(KEYS), VALUES), port=st.sampled_from([TOOL, FIELD, BALL]))
+@examples(300)
+def test_whatever_comes_is_refused_whole_or_is_finite_and_within_limits(
+    fields: dict[str, Any], port: PortLimits
+) -> None:
+    update = Update()
+    before = said_all(copied(update))
+    try:
+        said = examine(fields, port, 2)
+    except WrongMessageError:
+        assert said_all(update) == before
+        return
+    merge(said, update)
+    vectors = (update.position_m, update.velocity_m_per_s, update.angular_velocity_rad_per_s, update.force_n)
+    assert all(math.isfinite(number) for vector in (*vectors, update.orientation) for number in vector)
+    assert math.hypot(*update.velocity_m_per_s) <= port.max_speed_m_per_s * (1.0 + 1e-12)
+    assert math.hypot(*update.force_n) <= port.max_force_n * (1.0 + 1e-12)
+    assert 0.0 <= update.stiffness_n_per_m <= port.stiffness_n_per_m
+    assert 0.0 <= update.damping_n_s_per_m <= port.damping_n_s_per_m
+    assert 0 <= update.seq < 2**62
+    copied(update)  # it fits into its slot
+
+
+@pytest.mark.parametrize(
+    ("port", "fields", "text"),
+    [
+        (TOOL, {"position_m": [math.nan]}, "position_m: must be a finite number"),
+        (TOOL, {"position_m": [0.0, 0.0]}, "position_m: must be a list of 1 numbers"),
+        (TOOL, {"position_m": [10.5]}, "position_m: must be -10 to 10"),
+        (TOOL, {"stiffness_n_per_m": 501.0}, "stiffness_n_per_m = 501: must be 0 to 500, as the configuration has it"),
+        (
+            TOOL, {"force_n": [1.0]},
+            "tool is a coupling and has no force_n: it takes position_m, velocity_m_per_s, stiffness_n_per_m, "
+            "damping_n_s_per_m",
+        ),
+        (FIELD, {"force_n": [True]}, "force_n: must be a finite number"),
+        (BALL, {"position_m": [0.0]}, "position_m: must be a list of 3 numbers"),
+        (BALL, {"orientation": [0.0, 0.0, 0.0, 0.0]}, "orientation: must be a quaternion w x y z, of length 1"),
+        (TOOL, {"seq": -1}, "seq: must be a whole number, 0 or more"),
+        (TOOL, {"seq": None}, "seq: must be a whole number, 0 or more"),
+    ],
+)  # fmt: skip
+def test_a_refusal_says_what_is_wrong(port: PortLimits, fields: dict[str, Any], text: str) -> None:
+    with pytest.raises(WrongMessageError) as refused:
+        taken(port, **fields)
+    assert str(refused.value) == text
+
+
+def test_a_force_beyond_the_limit_keeps_its_direction() -> None:
+    assert taken(FIELD, axes=2, force_n=[30.0, -40.0]).force_n[:2] == pytest.approx([1.2, -1.6])
+    assert taken(FIELD, force_n=[1e308]).force_n[0] == pytest.approx(2.0)
+    assert taken(FIELD, force_n=[1]).force_n[0] == 1.0
+
+
+def test_what_was_said_before_stays_but_for_the_velocity_of_another_place() -> None:
+    update = Update()
+    merge(examine({"seq": 1, "position_m": [0.1], "velocity_m_per_s": [0.5]}, TOOL, 1), update)
+    merge(examine({"seq": 2, "stiffness_n_per_m": 100}, TOOL, 1), update)
+    assert update.said == POSITION | VELOCITY | STIFFNESS
+    assert (update.position_m[0], update.velocity_m_per_s[0], update.stiffness_n_per_m) == (0.1, 0.5, 100.0)
+    merge(examine({"seq": 3, "position_m": [0.2]}, TOOL, 1), update)
+    assert update.said == POSITION | STIFFNESS
+    assert update.seq == 3
+
+
+def test_a_turn_belongs_to_its_orientation() -> None:
+    update = Update()
+    pose = {"orientation": [1, 0, 0, 0], "angular_velocity_rad_per_s": [0, 0, 1]}
+    merge(examine({"seq": 1, **pose}, BALL, 3), update)
+    assert update.said == ORIENTATION | TURNING
+    merge(examine({"seq": 2, "orientation": [0, 1, 0, 0]}, BALL, 3), update)
+    assert update.said == ORIENTATION
+
+
+def test_who_speaks_again_has_not_let_go() -> None:
+    update = Update()
+    update.said = RELEASED | FORCE
+    merge(examine({"seq": 1, "force_n": [1.0]}, FIELD, 1), update)
+    assert update.said == FORCE
