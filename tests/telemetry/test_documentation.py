@@ -21,6 +21,7 @@ from hapticd.telemetry.wire import Topic
 from hapticd.tick.event import LoopEvent
 from hapticd_views.recording import messages
 from tests.daemon.running import Daemon
+from tests.remote.stage import drives_the_tool
 from tests.telemetry.sockets import Wire, served, ticks, wait_until
 
 ROOT = Path(__file__).parent.parent.parent
@@ -176,7 +177,7 @@ def javascript(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if npm is None:
         pytest.skip("apt install npm")
     folder = tmp_path_factory.mktemp("javascript")
-    for name in ("package.json", "package-lock.json", "subscribe.mjs"):
+    for name in ("package.json", "package-lock.json", "subscribe.mjs", "drive.mjs"):
         shutil.copy(DOCS / "examples" / "javascript" / name, folder)
     command = [npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
@@ -203,6 +204,10 @@ def test_the_javascript_example_reads_a_running_daemon(javascript: Path) -> None
     seen = [int(line[1]) for line in lines if line[0] == "tick"]
     assert seen == [seen[0], seen[0] + 500, seen[0] + 1000]
     assert not [line for line in lines if line[0] == "lost"]
+
+
+def test_the_javascript_client_drives_a_running_daemon(javascript: Path) -> None:
+    drives_the_tool(["node", javascript.with_name("drive.mjs")])
 
 
 def test_the_lock_file_names_no_place() -> None:
