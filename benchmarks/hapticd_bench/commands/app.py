@@ -21,6 +21,10 @@ app = lazy_group(
             f"{_COMMANDS}.viewers:viewers",
             "Measure what two recorders, a dashboard with a page and 14 subscribers cost.",
         ),
+        "remote": (
+            f"{_COMMANDS}.remote:remote",
+            "Measure how soon a client's message is felt and a tick is heard of, next to a bare ZeroMQ echo.",
+        ),
         "batch": (
             f"{_COMMANDS}.batch:batch",
             "Measure the offline simulator next to the same computation in C.",
