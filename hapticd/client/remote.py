@@ -23,7 +23,7 @@ import zmq
 
 from hapticd.client.commands import TIMEOUT_S, RefusedError
 from hapticd.errors import ClientError, SchemaError, SilenceError
-from hapticd.keys.client import CurveClient, client_keys
+from hapticd.keys.client import ENVIRONMENT, CurveClient, RefusedKeyError, client_keys
 
 SCHEMA = 1
 """Version of the protocol that this client speaks."""
@@ -117,6 +117,9 @@ class RemotePort:
     """
 
     def __init__(self, name: str, scene: str, state: str, keys: Path | str | None = None) -> None:
+        own = client_keys(scene, keys)
+        if own is None and scene.startswith("tcp://"):
+            raise RefusedKeyError(f"{scene}: takes keys: name your key file with keys= or ${ENVIRONMENT}")
         self.name = name
         self.seq = 0
         self._endpoint = scene
@@ -130,7 +133,7 @@ class RemotePort:
         self._sending.setsockopt(zmq.ROUTING_ID, b"\x01" + os.urandom(15))
         self._hearing = self._socket(zmq.SUB, 0)
         self._hearing.setsockopt(zmq.SUBSCRIBE, b"")
-        self._to_scene = CurveClient(self._sending, scene, client_keys(scene, keys))
+        self._to_scene = CurveClient(self._sending, scene, own)
         self._from_state = CurveClient(self._hearing, state, client_keys(state, keys))
         try:
             self._to_scene.connect()
