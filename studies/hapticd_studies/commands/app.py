@@ -41,6 +41,10 @@ app = lazy_group(
             f"{_COMMANDS}.remote:command",
             "Press what late programs render, under every law, and say what stiffness they get.",
         ),
+        "space-robustness": (
+            f"{_COMMANDS}.space_robustness:command",
+            "Let random hands touch random surfaces in space under some laws, and count who is steady.",
+        ),
         "extremes": (
             f"{_COMMANDS}.extremes:command",
             "Hold the model's arithmetic against exact answers, over many decades of every parameter.",

@@ -1,0 +1,230 @@
+"""Random devices, surfaces and hands: each is drawn from its seed and its index alone, so that any one can be replayed."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from random import Random
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.config.models import LoopConfig
+from hapticd.errors import ConfigError
+from hapticd.simulation.space.linkage import mass_matrix
+from hapticd_studies.boundaries import damper_peak
+from hapticd_studies.law_spec import LawSpec
+from hapticd_studies.space_robustness.surfaces import KINDS, Surface, digits, surface
+
+DURATION_S = 3.0
+MAX_FORCE_N = 12.0
+WITHIN_REACH = 0.8
+"""A case is within reach of damping below this share of the damper peak of its lightest direction."""
+
+HANDS = ("press", "stroke", "tap", "circle", "let go")
+LETS_GO_S = 1.0
+
+DRAWN = (
+    "axes of 0.15-0.5 kg and 1-6 N s/m each, 4 in 10 by themselves (half of these with 0.02-0.2 N of Coulomb friction), "
+    "4 in 10 coupled by a mass matrix, 2 in 10 on a delta linkage; position steps of 1-30 um, 0.5-2 kHz, 3 in 10 with "
+    f"one sample of force delay; a surface of 4-30 kN/m, one of {', '.join(KINDS)}, facing any way, 5 in 10 with "
+    "friction of 0.1-1, dynamic 0.6-1 of static; a hand of 0.5-6 N of a limit of 12 N that presses, strokes along the "
+    "surface, taps, traces a circle (there the surface faces up) or lets go, holds its place by a spring of 100-400 N/m "
+    "and what a bulging surface takes to stay on, and damps 1-4 N s/m; it starts 0.01-3 mm off the surface"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A device in a hand at a surface.
+
+    Attributes:
+        seed, index: what it was drawn from.
+        surface: what it touches.
+        hand: what the hand does, one of `HANDS`.
+        options: `device.options` of its configuration.
+        objects: the scene.
+        rate_hz: loop rate [Hz].
+        lightest_kg: mass of device and hand in their lightest direction.
+        delay_samples: until a force acts.
+    """
+
+    seed: int
+    index: int
+    surface: Surface
+    hand: str
+    options: dict[str, Any]
+    objects: list[dict[str, Any]]
+    rate_hz: float
+    lightest_kg: float
+    delay_samples: int
+
+    @property
+    def name(self) -> str:
+        """As `--only` takes it."""
+        return f"{self.seed}:{self.index}"
+
+    @property
+    def period_s(self) -> float:
+        """Time between ticks, as the daemon rounds it [s]."""
+        return LoopConfig(rate_hz=self.rate_hz).period_s
+
+    @property
+    def stiffness_n_per_m(self) -> float:
+        """Of its stiffest surface [N/m]."""
+        return max(float(each["stiffness_n_per_m"]) for each in self.objects)
+
+    @property
+    def rough(self) -> bool:
+        """Whether there is friction."""
+        return float(self.objects[0]["static_friction"]) > 0.0
+
+    @property
+    def peak_share(self) -> float:
+        """Stiffness as a share of the most that any damping holds on the lightest direction."""
+        return self.stiffness_n_per_m / damper_peak(self.lightest_kg, self.period_s, self.delay_samples)
+
+    @property
+    def within_reach(self) -> bool:
+        """Whether damping could hold it with something to spare."""
+        return self.peak_share < WITHIN_REACH
+
+    def config(self, law: LawSpec) -> str:
+        """A configuration that runs it, TOML."""
+        return tomlkit.dumps(
+            {
+                "loop": {"rate_hz": self.rate_hz},
+                "device": {"driver": "loopback", "options": self.options},
+                "scene": {"objects": self.objects},
+                "controller": {"law": law.name, "params": dict(law.values)},
+                "safety": {"max_force_n": MAX_FORCE_N},
+            }
+        )
+
+    def loaded(self, law: LawSpec) -> LoadedConfig:
+        """The same, checked."""
+        return parse(self.config(law), f"{self.name} {law.label}")
+
+    def figures(self) -> dict[str, float | int | str]:
+        """Its parameters as columns of a table."""
+        return {
+            "surface": self.surface.kind,
+            "hand": self.hand,
+            "rough": int(self.rough),
+            "stiffness_n_per_m": self.stiffness_n_per_m,
+            "rate_hz": self.rate_hz,
+            "force_delay_samples": self.delay_samples,
+            "lightest_kg": self.lightest_kg,
+            "share_of_damper_peak": self.peak_share,
+            "within_reach": int(self.within_reach),
+        }
+
+
+@lru_cache(maxsize=4096)
+def draw(seed: int, index: int) -> Case:
+    """The case of a seed and an index."""
+    source = Random(f"hapticd space robustness {seed}:{index}")
+
+    def uniform(low: float, high: float) -> float:
+        return digits(source.uniform(low, high))
+
+    def logarithmic(low: float, high: float) -> float:
+        return digits(low * (high / low) ** source.random())
+
+    # Kinds go round, so that a few cases show them all; every number is drawn whether it is used or not.
+    kind, hand = KINDS[index % len(KINDS)], HANDS[index // len(KINDS) % len(HANDS)]
+    touched = surface(source, kind, hand != "circle")
+    stiffness, softer = logarithmic(4e3, 3e4), uniform(0.3, 0.9)
+    static, slips = uniform(0.1, 1.0), uniform(0.6, 1.0)
+    rough, late, coupling = source.random() < 0.5, source.random() < 0.3, source.random()
+    friction = {"static_friction": static, "dynamic_friction": digits(static * slips)} if rough else {}
+    objects = [{**each, "stiffness_n_per_m": stiffness, "static_friction": 0.0, **friction} for each in touched.objects]
+    if kind == "two surfaces":
+        objects[1]["stiffness_n_per_m"] = digits(softer * stiffness)
+    axes = [{"mass_kg": uniform(0.15, 0.5), "damping": uniform(1.0, 6.0), "coulomb": uniform(0.02, 0.2)} for _ in "xyz"]
+    newton, lean, amplitude = uniform(0.5, 6.0), uniform(0.0, 0.3), uniform(0.3, 1.5)
+    start_m, spring, damping, hand_kg = logarithmic(1e-5, 3e-3), uniform(100.0, 400.0), uniform(1.0, 4.0), uniform(0, 0.1)
+    if touched.bend_per_m > 0.0:  # else the hand slips off
+        spring = digits(spring + 2.0 * newton * touched.bend_per_m)
+    pace, radius_m = uniform(0.5, 1.5), logarithmic(5e-4, 4e-3)
+    coulomb = source.random() < 0.5
+    turn = _turn(source)
+    at, normal, along = (np.array(each) for each in (touched.at_m, touched.normal, touched.along))
+
+    press = _list(-newton * normal)
+    force: dict[str, Any]
+    aim: dict[str, Any] = {"path": "hold", "at_m": _list(at)}
+    springs = [spring] * 3
+    match hand:
+        case "press":
+            force = {"profile": "press", "newton": _list(-newton * (normal + lean * along)), "duration_s": 0.2}
+        case "stroke":
+            force = {"profile": "stroke", "newton": press, "along_newton": _list(amplitude * along)}
+            force["frequency_hz"] = pace
+        case "tap":
+            force = {"profile": "tap", "newton": press, "period_s": digits(1.0 / pace)}
+            force["release_newton"] = _list(0.5 * normal)
+        case "circle":
+            force = {"profile": "constant", "newton": press}
+            aim = {"path": "circle", "centre_m": _list(at), "radius_m": radius_m, "frequency_hz": pace}
+        case _:
+            force = {"profile": "let-go", "newton": press, "at_s": LETS_GO_S}
+
+    space: dict[str, Any] = {"position_m": _list(at + start_m * normal)}
+    options: dict[str, Any] = {
+        "axes": 3,
+        "resolution_m": logarithmic(1e-6, 3e-5),
+        "max_force_n": MAX_FORCE_N,
+        "force_delay_samples": int(late),
+        "space": space,
+    }
+    masses = [each["mass_kg"] for each in axes]
+    if coupling < 0.4:
+        space["mass_kg"] = masses
+        matrix = np.diag(masses)
+        if coulomb:
+            space["coulomb_n"] = [each["coulomb"] for each in axes]
+    elif coupling < 0.8:
+        matrix = turn @ np.diag(masses) @ turn.T
+        matrix = 0.5 * (matrix + matrix.T)
+        space["mass_matrix_kg"] = matrix.tolist()
+    else:
+        options["mass_kg"] = masses[0]
+        space["linkage"] = "delta"
+        matrix = np.array(mass_matrix(masses[0], [0.0] * 3, *touched.at_m))
+    space["viscous_n_s_per_m"] = [each["damping"] for each in axes]
+    space["hand"] = {
+        "force": force,
+        "aim": aim,
+        "mass_kg": [hand_kg] * 3,
+        "damping_n_s_per_m": [damping] * 3,
+        "stiffness_n_per_m": springs,
+    }
+    rate_hz = logarithmic(500.0, 2000.0)
+    lightest_kg = float(np.linalg.eigvalsh(matrix).min()) + hand_kg
+    return Case(seed, index, touched, hand, options, objects, rate_hz, lightest_kg, int(late))
+
+
+def case_of(text: str) -> Case:
+    """The case of `SEED:INDEX`.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    found = re.fullmatch(r"(\d{1,18}):(\d{1,9})", text)
+    if found is None:
+        raise ConfigError(f"--only {text}: must be SEED:INDEX, as 1:75")
+    return draw(int(found[1]), int(found[2]))
+
+
+def _turn(source: Random) -> Any:
+    """A random rotation."""
+    matrix, _ = np.linalg.qr(np.array([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)]))
+    return matrix
+
+
+def _list(vector: Any) -> list[float]:
+    return [float(value) for value in vector]

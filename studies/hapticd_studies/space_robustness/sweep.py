@@ -1,0 +1,66 @@
+"""Every case under every law, judged, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from hapticd.offline.outcome import Criterion
+from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
+from hapticd_studies.grid.journal import Row
+from hapticd_studies.law_spec import LawSpec
+from hapticd_studies.space_robustness.cases import Case, draw
+from hapticd_studies.space_robustness.verdict import judged
+
+LAWS = "none,damper,tdpa,energy-cycle,ring-damping"
+
+_MOST_CASES = 20
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceRobustnessPlan:
+    """What is wanted.
+
+    Attributes:
+        seed: of all cases.
+        count: how many.
+        laws: those that are compared.
+        criterion: what still and in place mean.
+    """
+
+    seed: int
+    count: int
+    laws: Sequence[LawSpec]
+    criterion: Criterion
+
+    @property
+    def cases(self) -> list[Case]:
+        """The cases, in order."""
+        return [draw(self.seed, index) for index in range(self.count)]
+
+    def job(self) -> Job:
+        """Cut into blocks, as many for each law."""
+        sizes = block_sizes(self.count, _MOST_CASES)
+        spec = {
+            "seed": self.seed,
+            "laws": [{"label": law.label, "name": law.name, "values": dict(law.values)} for law in self.laws],
+            "criterion": asdict(self.criterion),
+            "sizes": sizes,
+        }
+        names = tuple(sorted({law.name for law in self.laws}))
+        return Job(_block, spec, sizes * len(self.laws), names, interpreted=True)
+
+    def tables(self, blocks: Sequence[list[Row]]) -> list[np.ndarray[Any, Any]]:
+        """Of each law a table with a row a case."""
+        sizes = block_sizes(self.count, _MOST_CASES)
+        each = [blocks[at : at + len(sizes)] for at in range(0, len(blocks), len(sizes))]
+        return [np.array(in_order(sizes, found)) for found in each]
+
+
+def _block(spec: dict[str, Any], block: int, _threads: int | None) -> list[Row]:
+    sizes = spec["sizes"]
+    law, criterion = LawSpec(**spec["laws"][block // len(sizes)]), Criterion(**spec["criterion"])
+    return [judged(draw(spec["seed"], index), law, criterion) for index in block_cells(sizes, block % len(sizes))]
