@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from hapticd.shapes.surface import SURFACE_M, distance, land, trace
+from hapticd.shapes.surface import SURFACE_M, ahead, buried, distance, land, trace
 
 _LEAST_M2 = 1e-16
 _SLIDES = 10
@@ -59,10 +59,24 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
         if tx * tx + ty * ty + tz * tz < proxy.least_m2:
             break
         d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
+        wall = False
+        if (
+            proxy.end_part > proxy.first_part
+            and -SURFACE_M <= d <= SURFACE_M
+            and buried(proxy, others, voxels, x, y, z, mx, my, mz)
+        ):  # between two shapes that are flush: what stands there is another face
+            wall = True
+            d, mx, my, mz = ahead(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, nx, ny, nz)
+            x = proxy.gx - d * mx
+            y = proxy.gy - d * my
+            z = proxy.gz - d * mz
+            if d < 0.0:
+                break
+            d = 1.0
         vx = px - x
         vy = py - y
         vz = pz - z
-        vv = vx * vx + vy * vy + vz * vz
+        vv = ww if wall else vx * vx + vy * vy + vz * vz
         turn = nx * mx + ny * my + nz * mz
         if -_ONE_FACE < turn < _ONE_FACE:  # another face: where both meet, if the device is behind both
             a = wx * nx + wy * ny + wz * nz
@@ -70,7 +84,10 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             both = 1.0 - turn * turn
             first = (turn * b - a) / both
             second = (turn * a - b) / both
-            if first > 0.0 and second > 0.0:
+            if wall and not first > 0.0:  # up on the other face
+                first = 0.0
+                second = -b
+            if (first > 0.0 or wall) and second > 0.0:
                 e, qx, qy, qz, ox, oy, oz = land(
                     proxy,
                     others,
@@ -88,9 +105,10 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
                     x = qx
                     y = qy
                     z = qz
-                    mx = ox
-                    my = oy
-                    mz = oz
+                    if not wall:  # else the normal may be that of what is hidden
+                        mx = ox
+                        my = oy
+                        mz = oz
                     vx = tx
                     vy = ty
                     vz = tz
@@ -107,7 +125,7 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             wy = vy
             wz = vz
             ww = vv
-            if gained < proxy.least_m2:
+            if gained < proxy.least_m2 and turn > _ONE_FACE:
                 break
             share = 1.0
             crease = False

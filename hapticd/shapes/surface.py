@@ -11,6 +11,9 @@ SURFACE_M = 1e-6
 """A point this near is on the surface; what is left is corrected to first order."""
 
 _STEPS = 48
+_BEYOND_M = 4.0 * SURFACE_M
+_AGAINST = -0.9
+_FACE = 0.98
 _LANDINGS = 4
 
 
@@ -67,6 +70,58 @@ def land(
         y -= d * ny
         z -= d * nz
     return d, x, y, z, nx, ny, nz
+
+
+def buried(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, nx: float, ny: float, nz: float) -> bool:
+    """Whether a point at distance 0 is none of the surface: there two flush shapes lie against each other."""
+    d, mx, my, mz = distance(proxy, others, voxels, x + _BEYOND_M * nx, y + _BEYOND_M * ny, z + _BEYOND_M * nz)
+    return d < -SURFACE_M and nx * mx + ny * my + nz * mz < _AGAINST
+
+
+def ahead(
+    proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, nx: float, ny: float, nz: float
+) -> tuple[float, float, float, float]:
+    """Of all shapes of a union, distance and normal of the nearest that stands up from a face.
+
+    Args:
+        proxy: the proxy.
+        others: the other shapes of its solid.
+        voxels: the distances of its fields.
+        x: a point on the face, with y and z [m].
+        y: see x.
+        z: see x.
+        nx: the face's normal, with ny and nz.
+        ny: see nx.
+        nz: see nx.
+
+    Returns:
+        A negative distance where there is none.
+    """
+    x += _BEYOND_M * nx
+    y += _BEYOND_M * ny
+    z += _BEYOND_M * nz
+    d, mx, my, mz = shape_distance(proxy, voxels, x, y, z)
+    if d < 0.0 or nx * mx + ny * my + nz * mz > _FACE:
+        d = -1.0
+    for at in range(proxy.first_part, proxy.end_part):
+        part = others[at]
+        bx = x - part.px
+        by = y - part.py
+        bz = z - part.pz
+        qx = part.xx * bx + part.yx * by + part.zx * bz
+        qy = part.xy * bx + part.yy * by + part.zy * bz
+        qz = part.xz * bx + part.yz * by + part.zz * bz
+        e, qx, qy, qz = shape_distance(part, voxels, qx, qy, qz)
+        if e >= 0.0 and (d < 0.0 or e < d):
+            bx = part.xx * qx + part.xy * qy + part.xz * qz
+            by = part.yx * qx + part.yy * qy + part.yz * qz
+            bz = part.zx * qx + part.zy * qy + part.zz * qz
+            if nx * bx + ny * by + nz * bz <= _FACE:
+                d = e
+                mx = bx
+                my = by
+                mz = bz
+    return d, mx, my, mz
 
 
 def trace(

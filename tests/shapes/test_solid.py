@@ -85,6 +85,26 @@ def test_a_corner_of_two_boxes_pushes_both_ways_and_no_harder() -> None:
     )
 
 
+@pytest.mark.parametrize("pose", [HERE, ASKEW], ids=["upright", "askew"])
+def test_the_notch_of_two_flush_boxes_lets_no_proxy_in_between_them(pose: Pose) -> None:
+    """One box stands on the other, half over its edge: where their faces lie against each other is no surface."""
+    size = (0.08, 0.08, 0.08)
+    boxes = [
+        Placed("box", Pose(pose.point(at), pose.rotation), size_m=size)
+        for at in ((0.0, 0.0, -0.04), (-0.04, 0.0, 0.04))
+    ]
+    proxy = Proxy(boxes)
+    stand(proxy, pose.point((0.001, 0.0, 0.001)))
+    draw = random.Random(4)
+    x = z = 0.001
+    for _ in range(600):
+        x = min(max(x + draw.gauss(0.0, 4e-4), -0.003), 0.002)
+        z = min(max(z + draw.gauss(0.0, 4e-4), -0.003), 0.002)
+        go(proxy, pose.point((x, 0.0, z)))
+        free = pose.out((max(-x, 0.0), 0.0, max(-z, 0.0)))
+        assert spring(proxy) == pytest.approx(free, abs=1e-5)
+
+
 def test_a_stroke_along_a_valley_is_followed_at_once() -> None:
     """Two planes lean on each other; pressed into both, the nearest free point is on the crease, right at hand."""
     proxy = Proxy(UNIONS["valley"])
