@@ -1,4 +1,4 @@
-"""Random devices, surfaces and hands: each is drawn from its seed and its index alone, so that any one can be replayed."""
+"""Random devices, surfaces and hands: each is drawn from its seed and index alone, so that any can be replayed."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ HANDS = ("press", "stroke", "tap", "circle", "let go")
 LETS_GO_S = 1.0
 
 DRAWN = (
-    "axes of 0.15-0.5 kg and 1-6 N s/m each, 4 in 10 by themselves (half of these with 0.02-0.2 N of Coulomb friction), "
-    "4 in 10 coupled by a mass matrix, 2 in 10 on a delta linkage; position steps of 1-30 um, 0.5-2 kHz, 3 in 10 with "
-    f"one sample of force delay; a surface of 4-30 kN/m, one of {', '.join(KINDS)}, facing any way, 5 in 10 with "
-    "friction of 0.1-1, dynamic 0.6-1 of static; a hand of 0.5-6 N of a limit of 12 N that presses, strokes along the "
-    "surface, taps, traces a circle (there the surface faces up) or lets go, holds its place by a spring of 100-400 N/m "
-    "and what a bulging surface takes to stay on, and damps 1-4 N s/m; it starts 0.01-3 mm off the surface"
+    "axes of 0.15-0.5 kg and 1-6 N s/m each, 4 in 10 by themselves (half of them with 0.02-0.2 N of Coulomb "
+    "friction), 4 in 10 coupled by a mass matrix, 2 in 10 on a delta linkage; position steps of 1-30 um, 0.5-2 kHz, "
+    "3 in 10 with one sample of force delay; a surface of 4-30 kN/m, facing any way, 5 in 10 with friction of 0.1-1, "
+    f"dynamic 0.6-1 of static, one of {', '.join(KINDS)}; a hand of 0.5-6 N of a limit of 12 N that presses, strokes "
+    "along the surface, taps, traces a circle (there the surface faces up) or lets go, holds its place by a spring of "
+    "100-400 N/m and what a bulging surface takes to stay on, and damps 1-4 N s/m; it starts 0.01-3 mm off the surface"
 )
 
 
@@ -144,13 +144,19 @@ def draw(seed: int, index: int) -> Case:
     objects = [{**each, "stiffness_n_per_m": stiffness, "static_friction": 0.0, **friction} for each in touched.objects]
     if kind == "two surfaces":
         objects[1]["stiffness_n_per_m"] = digits(softer * stiffness)
-    axes = [{"mass_kg": uniform(0.15, 0.5), "damping": uniform(1.0, 6.0), "coulomb": uniform(0.02, 0.2)} for _ in "xyz"]
+    masses = [uniform(0.15, 0.5) for _ in "xyz"]
+    viscous, coulomb_n = [uniform(1.0, 6.0) for _ in "xyz"], [uniform(0.02, 0.2) for _ in "xyz"]
     newton, lean, amplitude = uniform(0.5, 6.0), uniform(0.0, 0.3), uniform(0.3, 1.5)
-    start_m, spring, damping, hand_kg = logarithmic(1e-5, 3e-3), uniform(100.0, 400.0), uniform(1.0, 4.0), uniform(0, 0.1)
+    start_m, spring, damping, hand_kg = (
+        logarithmic(1e-5, 3e-3),
+        uniform(100.0, 400.0),
+        uniform(1.0, 4.0),
+        uniform(0, 0.1),
+    )
     if touched.bend_per_m > 0.0:  # else the hand slips off
         spring = digits(spring + 2.0 * newton * touched.bend_per_m)
     pace, radius_m = uniform(0.5, 1.5), logarithmic(5e-4, 4e-3)
-    coulomb = source.random() < 0.5
+    rubs = source.random() < 0.5
     turn = _turn(source)
     at, normal, along = (np.array(each) for each in (touched.at_m, touched.normal, touched.along))
 
@@ -181,12 +187,11 @@ def draw(seed: int, index: int) -> Case:
         "force_delay_samples": int(late),
         "space": space,
     }
-    masses = [each["mass_kg"] for each in axes]
     if coupling < 0.4:
         space["mass_kg"] = masses
         matrix = np.diag(masses)
-        if coulomb:
-            space["coulomb_n"] = [each["coulomb"] for each in axes]
+        if rubs:
+            space["coulomb_n"] = coulomb_n
     elif coupling < 0.8:
         matrix = turn @ np.diag(masses) @ turn.T
         matrix = 0.5 * (matrix + matrix.T)
@@ -195,7 +200,7 @@ def draw(seed: int, index: int) -> Case:
         options["mass_kg"] = masses[0]
         space["linkage"] = "delta"
         matrix = np.array(mass_matrix(masses[0], [0.0] * 3, *touched.at_m))
-    space["viscous_n_s_per_m"] = [each["damping"] for each in axes]
+    space["viscous_n_s_per_m"] = viscous
     space["hand"] = {
         "force": force,
         "aim": aim,

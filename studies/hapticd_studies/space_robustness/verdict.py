@@ -66,26 +66,35 @@ def judged(case: Case, law: LawSpec, criterion: Criterion) -> list[float]:
         felt = _length(felt_index(axis, period_s) for axis in end.T)
         span_m = _length(np.ptp(way[-round(criterion.window_s / period_s) :], axis=0))
         misplaced_m, place_m = _misplaced(case, criterion, tick, space)
-        verdict = Verdict.UNSTEADY if span_m > limit_m else Verdict.ELSEWHERE if misplaced_m > place_m else Verdict.STEADY
+        verdict = (
+            Verdict.UNSTEADY if span_m > limit_m else Verdict.ELSEWHERE if misplaced_m > place_m else Verdict.STEADY
+        )
     else:
         felt = _length(felt_index(axis, period_s, MOVING_HZ) for axis in end.T)
-        before_m, span_m = _fast(way, period_s)
+        before_m, span_m = fast_m(way, period_s)
         misplaced_m = math.nan
         if case.hand == "tap" or case.rough:
             limit_m = max(limit_m, GROWS * before_m)
-        verdict = Verdict.UNSTEADY if span_m > limit_m else Verdict.STEADY
+        verdict = Verdict.STEADY
+    if span_m > limit_m:
+        verdict = Verdict.UNSTEADY
     return [float(verdict), span_m, limit_m, misplaced_m, felt, peak_n, damping]
 
 
-def _fast(way: Any, period_s: float) -> tuple[float, float]:
-    """How far the fast part of a position spans, in the second third of a run and in the last [m]."""
+def fast_m(way: Any, period_s: float) -> tuple[float, float]:
+    """How far the fast part of a position spans, in the second third of a run and in the last [m].
+
+    Args:
+        way: a row a tick, a column an axis [m].
+        period_s: between ticks [s].
+    """
     count = len(way)
     steps = np.arange(count)[:, None] / (count - 1.0)
     level = way - (way[0] + (way[-1] - way[0]) * steps)  # else the ends do not fit together
     lines = np.fft.rfft(level, axis=0)
     lines[np.fft.rfftfreq(count, period_s) < MOVING_HZ] = 0.0
     fast = np.fft.irfft(lines, count, axis=0)
-    third, margin = count // 3, count // 60  # what rings at the very ends is of the transform
+    third, margin = count // 3, count // 30  # the transform itself rings at the very ends
     return _length(np.ptp(fast[third : 2 * third], axis=0)), _length(np.ptp(fast[2 * third : -margin], axis=0))
 
 
@@ -107,7 +116,7 @@ def _misplaced(case: Case, criterion: Criterion, tick: SpaceTick, space: Spatial
             stiffness = max(stiffness, contact.solid.stiffness_n_per_m)
             depth_m = max(depth_m, proxy.depth_m)
     held_m = float(np.linalg.norm(space.options.space.coulomb_n or (0.0,))) / stiffness  # Coulomb friction holds it
-    pressed_m = float(np.linalg.norm(hand.force.newton)) / case.stiffness_n_per_m  # type: ignore[union-attr]
+    pressed_m = float(np.linalg.norm(hand.force.newton or (0.0,))) / case.stiffness_n_per_m
     depth_m = max(depth_m, pressed_m)  # a hand that has let go: what it was pressed to
     may_m = max(criterion.place_share * depth_m, criterion.place_counts * space.options.resolution_m) + held_m
     return float(np.linalg.norm(left_n)) / stiffness, may_m
