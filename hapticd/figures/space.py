@@ -64,7 +64,7 @@ def views(path_m: Any, solids: Sequence[Proxy], proxy_m: Any = None, title: str 
                 aspect="equal",
             )
             other = 3 - across - up
-            panel.set_title(f"cut at {_NAMES[other]} = {1e3 * at[other]:.3g} mm", fontweight="normal")
+            panel.set_title(f"cut at {_NAMES[other]} = {round(1e3 * at[other], 2) + 0.0:g} mm", fontweight="normal")
         figure.legend(handles=_legend(held), loc="outside lower center", ncols=4)
         if title:
             figure.suptitle(title, fontsize=8.5, fontweight="bold")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hapticd.cli import main
+from hapticd.simulation.space.linkage import mass_matrix
 from hapticd_studies.space.linear import SpaceLoop, surface_stiffness
 from hapticd_studies.space.places import KINDS, draw
 from hapticd_studies.space.stepping import settles
@@ -92,6 +93,31 @@ def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.Capture
     lines = (tmp_path / "space.csv").read_text().splitlines()
     assert len(lines) == 1 + len(found["directions"])
     assert (tmp_path / "space.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_linkage_weighs_at_a_place_what_the_simulated_device_weighs_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At the end of its reach the arms are long levers: one direction is more than twice as heavy as another."""
+    place = ["--mass", "0.25", "--linkage", "0.08,0,0.06"]
+    with pytest.raises(SystemExit) as end:
+        main(["study", "space", "--places", "0", *place, "--output", str(tmp_path), "--json"])
+    assert not end.value.code
+    found = json.loads(capsys.readouterr().out)
+    assert found["mass_kg"] == mass_matrix(0.25, (0.0, 0.0, 0.0), 0.08, 0.0, 0.06)
+    lightest, _, heaviest = np.linalg.eigvalsh(found["mass_kg"])
+    assert heaviest > 2.4 * lightest
+    assert found["strongest"]["exact_n_per_m"] > 1.1 * found["weakest"]["exact_n_per_m"]
+
+
+@pytest.mark.parametrize("place", ["0,0", "0,0,0.07", "nan,0,0", "a,b,c"])
+def test_a_place_that_no_arm_reaches_is_one_clear_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], place: str
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["study", "space", "--mass", "0.25", "--linkage", place, "--output", str(tmp_path)])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.startswith(f"hapticd: --linkage {place}")
 
 
 @pytest.mark.parametrize(

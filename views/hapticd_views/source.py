@@ -54,8 +54,17 @@ def open_source(path: Path) -> Source:
         raise ConfigError(f"{path}: must end in .mcap (hapticd record), or in .csv or .npz (hapticd simulate)")
     if path.suffix == ".mcap":
         return recorded(path.name, read(path))
-    columns = _csv(path) if path.suffix == ".csv" else _npz(path)
+    columns = {name: column for name, column in table(path).items() if name in Row._fields}
     return Source(path.name, (Curves(path.name, columns),), None)
+
+
+def table(path: Path) -> Columns:
+    """Every column of a .csv or .npz of `hapticd simulate`.
+
+    Raises:
+        HapticdError: it cannot be read, or is none.
+    """
+    return _csv(path) if path.suffix == ".csv" else _npz(path)
 
 
 def recorded(name: str, recording: Recording) -> Source:
@@ -133,20 +142,20 @@ def _csv(path: Path) -> Columns:
         with path.open(encoding="utf-8") as file:
             names = file.readline().strip().split(",")
             rows = file.read()
-        table = np.loadtxt(rows.splitlines(), delimiter=",", ndmin=2) if rows.strip() else np.empty((0, len(names)))
+        numbers = np.loadtxt(rows.splitlines(), delimiter=",", ndmin=2) if rows.strip() else np.empty((0, len(names)))
     except OSError as error:
         raise HapticdError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError as error:
         raise HapticdError(f"{path}: is no table of numbers: {error}") from None
-    if table.shape[1] != len(names):
-        raise HapticdError(f"{path}: has {len(names)} names for {table.shape[1]} columns")
-    return {name: column for name, column in zip(names, table.T, strict=False) if name in Row._fields}
+    if numbers.shape[1] != len(names):
+        raise HapticdError(f"{path}: has {len(names)} names for {numbers.shape[1]} columns")
+    return dict(zip(names, numbers.T, strict=False))
 
 
 def _npz(path: Path) -> Columns:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
-            return {name: found[name] for name in found.files if name in Row._fields}
+            return {name: found[name] for name in found.files}
     except OSError as error:
         raise HapticdError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:

@@ -24,6 +24,10 @@ def command(
         str, typer.Option(help="Of the device [kg]: one number, one an axis, or nine of a matrix, with commas.")
     ] = "0.1,0.25,0.5",
     damping: Annotated[str, typer.Option(help="Viscous friction of the device, in the same way [N s/m].")] = "4",
+    linkage: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="On three arms, at this place [m]; --mass is one number, of the middle."),
+    ] = None,
     rate: Annotated[float, typer.Option(help="Of the loop [Hz].")] = 1000.0,
     delay: Annotated[int, typer.Option(min=0, max=16, help="Samples until a force acts.")] = 0,
     places: Annotated[
@@ -40,6 +44,7 @@ def command(
     Writes a picture, CSV and JSON.
 
     Example: hapticd study space --mass 0.2,0.2,0.35 --damping 4.4 --delay 1 --output directions
+    hapticd study space --mass 0.25 --linkage 0.06,0,0.04 --damping 4.4 --output omega
     """
     require_extra("study", "numpy", "scipy", "matplotlib")
     import numpy as np
@@ -54,9 +59,8 @@ def command(
         raise ConfigError(f"--places {places}: must be from 0 to {_MOST_PLACES}")
     if not 0 <= seed < 10**18:
         raise ConfigError(f"--seed {seed}: must be 0 or more and less than 1e18")
-    loop = SpaceLoop(
-        _matrix("--mass", mass), _matrix("--damping", damping), _HAND_N_PER_M * np.eye(3), 1.0 / rate, delay
-    )
+    weighs = _matrix("--mass", mass) if linkage is None else _on_arms(mass, linkage)
+    loop = SpaceLoop(weighs, _matrix("--damping", damping), _HAND_N_PER_M * np.eye(3), 1.0 / rate, delay)
     require_folder(output, _FILES)
     with progress_bar(TURNS + places, "space") as tell:
         found = study(loop, places, seed, lambda done: tell(completed=done))
@@ -86,6 +90,27 @@ def _matrix(option: str, text: str) -> Any:
     if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix).min() <= 0.0:
         raise ConfigError(f"{option} {text}: must be above 0 in every direction, a matrix symmetric")
     return matrix
+
+
+def _on_arms(mass: str, place: str) -> Any:
+    """The mass matrix of the linkage that the simulated device assumes, at a place."""
+    import numpy as np
+
+    from hapticd.simulation.space.linkage import REACH_M, mass_matrix
+
+    try:
+        at = [float(each) for each in place.split(",")]
+        (mass_kg,) = (float(each) for each in mass.split(","))
+    except ValueError:
+        raise ConfigError(
+            f"--linkage {place} --mass {mass}: must be three numbers with commas, and one mass, as 0.06,0,0.04 and 0.25"
+        ) from None
+    if len(at) != 3 or not all(abs(along) <= reach for along, reach in zip(at, REACH_M, strict=True)):
+        x, y, z = (f"{1e3 * reach:g}" for reach in REACH_M)
+        raise ConfigError(f"--linkage {place}: must be within {x}, {y} and {z} mm of the middle along x, y and z")
+    if not 0.0 < mass_kg < math.inf:
+        raise ConfigError(f"--mass {mass}: must be above 0")
+    return np.array(mass_matrix(mass_kg, (0.0, 0.0, 0.0), *at))
 
 
 def _held(found: Any) -> Table:

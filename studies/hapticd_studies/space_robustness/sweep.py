@@ -13,7 +13,7 @@ from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.space_robustness.cases import Case, draw
-from hapticd_studies.space_robustness.verdict import judged
+from hapticd_studies.space_robustness.verdict import COLUMNS, judged
 
 LAWS = "none,damper,tdpa,energy-cycle,ring-damping"
 
@@ -42,25 +42,25 @@ class SpaceRobustnessPlan:
         return [draw(self.seed, index) for index in range(self.count)]
 
     def job(self) -> Job:
-        """Cut into blocks, as many for each law."""
-        sizes = block_sizes(self.count, _MOST_CASES)
+        """Cut into blocks of cases; each runs under every law in turn, since a linkage takes long to make ready."""
         spec = {
             "seed": self.seed,
             "laws": [{"label": law.label, "name": law.name, "values": dict(law.values)} for law in self.laws],
             "criterion": asdict(self.criterion),
-            "sizes": sizes,
+            "sizes": block_sizes(self.count, _MOST_CASES),
         }
         names = tuple(sorted({law.name for law in self.laws}))
-        return Job(_block, spec, sizes * len(self.laws), names, interpreted=True)
+        return Job(_block, spec, block_sizes(self.count, _MOST_CASES), names, interpreted=True)
 
     def tables(self, blocks: Sequence[list[Row]]) -> list[np.ndarray[Any, Any]]:
         """Of each law a table with a row a case."""
-        sizes = block_sizes(self.count, _MOST_CASES)
-        each = [blocks[at : at + len(sizes)] for at in range(0, len(blocks), len(sizes))]
-        return [np.array(in_order(sizes, found)) for found in each]
+        rows = in_order(block_sizes(self.count, _MOST_CASES), blocks)
+        whole = np.array(rows).reshape(self.count, len(self.laws), len(COLUMNS))
+        return [whole[:, at] for at in range(len(self.laws))]
 
 
 def _block(spec: dict[str, Any], block: int, _threads: int | None) -> list[Row]:
-    sizes = spec["sizes"]
-    law, criterion = LawSpec(**spec["laws"][block // len(sizes)]), Criterion(**spec["criterion"])
-    return [judged(draw(spec["seed"], index), law, criterion) for index in block_cells(sizes, block % len(sizes))]
+    """A row a case: what it did under the first law, then under the next."""
+    laws, criterion = [LawSpec(**law) for law in spec["laws"]], Criterion(**spec["criterion"])
+    cases = [draw(spec["seed"], index) for index in block_cells(spec["sizes"], block)]
+    return [[value for law in laws for value in judged(case, law, criterion)] for case in cases]
