@@ -39,7 +39,7 @@ def test_the_device_is_drawn_where_it_was_and_its_proxy_on_the_ball(run: Path) -
 
 def test_a_stretch_is_cut_out(run: Path) -> None:
     figure = scene(open_source(run), run, BALL, 0.1, 0.2, "")
-    assert len(figure.axes[0].lines[0].get_xdata()) == 101
+    assert np.size(figure.axes[0].lines[0].get_xdata()) == 101
 
 
 @pytest.mark.parametrize(
