@@ -181,6 +181,27 @@ class Run:
         """The same over the measured depth, which is what the law sees [N/m]."""
         return self._displayed("x_measured_m")
 
+    @cached_property
+    def force_chatter_n(self) -> float:
+        """Span of the applied force at the end [N]."""
+        return _span(self._last("force_n"))
+
+    @cached_property
+    def felt_index(self) -> float:
+        """How many times the threshold of a hand the true position vibrates at the end.
+
+        NaN where a hand never comes to rest, with several axes, after a fault, or without numpy.
+        """
+        if self.in_space or self.outcome not in (Outcome.SETTLED, Outcome.ELSEWHERE, Outcome.MOVING):
+            return math.nan
+        try:
+            import numpy as np
+
+            from hapticd.offline.felt import felt_index
+        except ModuleNotFoundError:
+            return math.nan
+        return felt_index(np.array(self._last("x_m")), self.period_s)
+
     @property
     def summary(self) -> dict[str, Any]:
         """What became of it in numbers; None for what a run does not have."""
@@ -192,6 +213,8 @@ class Run:
             "peak_to_peak_m": self.peak_to_peak_m,
             "measured_peak_to_peak_m": self.measured_peak_to_peak_m,
             "mean_depth_m": -self.mean_m,
+            "felt_index": _known(self.felt_index),
+            "force_chatter_n": self.force_chatter_n,
             "displayed_stiffness_n_per_m": _known(self.displayed_stiffness_n_per_m),
             "measured_stiffness_n_per_m": _known(self.measured_stiffness_n_per_m),
             "commanded_stiffness_n_per_m": _known(self.stiffness_n_per_m),
@@ -209,10 +232,11 @@ class Run:
         """What became of it in some lines."""
         settled = "" if math.isnan(self.settled_s) else f" after {self.settled_s:.3g} s"
         outcome = f"settled{settled}" if self.outcome is Outcome.SETTLED else self.outcome.words
+        felt = "" if math.isnan(self.felt_index) else f", felt {self.felt_index:.2g} times the threshold"
         lines = [
             f"{outcome}: {self.fault}" if self.fault else outcome,
             f"last {self.window_s:g} s: {self.peak_to_peak_m * 1e3:.4g} mm peak to peak, "
-            f"mean depth {-self.mean_m * 1e3:.4g} mm",
+            f"mean depth {-self.mean_m * 1e3:.4g} mm{felt}, force chatter {self.force_chatter_n:.3g} N",
         ]
         if not math.isnan(self.displayed_stiffness_n_per_m):
             shown = f"{self.displayed_stiffness_n_per_m:.5g} N/m of {self.stiffness_n_per_m:g} N/m"

@@ -201,3 +201,15 @@ def test_columns_by_name_are_plain_arrays_that_a_run_without_numpy_has_too(settl
     kinds: dict[str, Any] = {name: column.typecode for name, column in settled.columns.items()}
     assert kinds == {name: {"cycle": "q", "in_contact": "b"}.get(name, "d") for name in Row._fields}
     assert all(isinstance(column, array) for column in settled.columns.values())
+
+
+def test_a_still_wall_may_be_felt_and_says_so(settled: Run) -> None:
+    """20 kN/m with 200 N s/m and steps of 10 um: still by the rule, and many times what a hand feels."""
+    law = {"controller.params.damping_n_s_per_m": 200.0}
+    hums = hapticd.simulate(press(20e3, law="damper").with_values(law), 3.0)
+    assert hums.outcome is settled.outcome is Outcome.SETTLED
+    assert hums.felt_index > 5.0 > 1.0 > settled.felt_index
+    assert hums.force_chatter_n > 0.5 > settled.force_chatter_n
+    assert f"felt {hums.felt_index:.2g} times the threshold, force chatter" in hums.words[1]
+    assert hums.summary["felt_index"] == hums.felt_index
+    assert math.isnan(hapticd.simulate(press(profile="sine", rest=", frequency_hz = 2.0"), 1.0).felt_index)

@@ -8,6 +8,7 @@ import re
 import pytest
 from typer.testing import CliRunner
 
+from hapticd.simulation.options import Flexible
 from hapticd_studies.commands.app import app
 from hapticd_studies.published import rows
 from tests.test_readme import ROOT
@@ -53,3 +54,20 @@ def test_a_coarser_sensor_makes_damping_felt_at_the_higher_rate_too() -> None:
     assert isinstance(fine, dict)
     assert isinstance(coarse, dict)
     assert fine[4000] < 1.0 < coarse[4000]
+
+
+def test_without_the_lag_the_advice_would_be_wrong() -> None:
+    assert rows.rate_advice().agrees
+    assert not rows.rate_advice(lag_s=0.0).agrees
+
+
+def test_a_handle_that_hardly_bends_decides_nothing_and_shrinks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    stiff = Flexible(frequency_hz=5000.0, handle_share=0.3, damping_ratio=0.5)
+    monkeypatch.setattr(rows, "_MODES", (stiff,))
+    assert not rows.mode_when_held().agrees
+    assert not rows.modes_shrink_region(dampings=(20, 60)).agrees
+
+
+def test_the_late_loop_meets_both_stiffnesses_that_were_measured() -> None:
+    limits = rows.rate().figures["late_limit_n_per_m"]
+    assert limits == [pytest.approx(325.0, rel=0.01), pytest.approx(904.0, rel=0.01)]

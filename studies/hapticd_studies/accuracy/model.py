@@ -32,6 +32,8 @@ class ModelRow:
         energy_j: largest error of the energy into the walls in the loop [J].
         leak: what a sampled wall gains under it; None without a wall.
         verdict: what became of the run.
+        felt_index: how many times the threshold of a hand it vibrates at the end; NaN where nothing rests.
+        force_chatter_n: span of its force there [N].
         displayed_n_per_m: stiffness shown at the end of the run [N/m]; NaN without contact.
         offered: may be chosen.
         best: nothing else that is offered is both cheaper and more accurate.
@@ -46,6 +48,8 @@ class ModelRow:
     energy_j: float
     leak: Leak | None
     verdict: str
+    felt_index: float
+    force_chatter_n: float
     displayed_n_per_m: float
     offered: bool
     best: bool
@@ -110,6 +114,8 @@ def measure_model(loaded: LoadedConfig, duration_s: float, progress: Callable[[s
             energy_j=run.energy_error_j(reference),
             leak=_leak(loaded, setting),
             verdict=run.outcome.words,
+            felt_index=run.felt_index,
+            force_chatter_n=run.force_chatter_n,
             displayed_n_per_m=run.displayed_stiffness_n_per_m,
             offered=setting.offered,
             best=False,

@@ -25,7 +25,7 @@ _WIDE = ("same forces", "no law")
 _COLUMNS = (
     "setting", "family", "ns_a_period", "cost_ratio", "operations", "same_forces_m", "position_error_m",
     "energy_error_j", "leak_share", "leak_j_a_cycle", "analytic_leak_j_a_cycle", "linear_loop", "verdict",
-    "displayed_n_per_m", "pareto", "default",
+    "felt_index", "force_chatter_n", "displayed_n_per_m", "pareto", "default",
 )  # fmt: skip
 
 
@@ -218,7 +218,7 @@ class AccuracyReport:
             row.name, row.family, row.cost.ns, row.cost.ratio, row.operations, row.same_forces_m, row.position_m,
             row.energy_j, found.share if found else None, found.per_cycle_j if found else None,
             found.theory_per_cycle_j if found else None, found.words if found else None, row.verdict,
-            row.displayed_n_per_m, row.best, row.name == self.model.default,
+            row.felt_index, row.force_chatter_n, row.displayed_n_per_m, row.best, row.name == self.model.default,
         ]  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """The published rows that the model can be asked about.
 
 Of most sources the abstract alone could be read, and of no device in them mass and friction together are known; each
-row says what was assumed. Sources whose rows need a flexible handle are named in docs/studies.md and not here.
+row says what was assumed.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hapticd.config.walls import WallConfig
+from hapticd.simulation.options import Flexible
 from hapticd_studies.boundaries import Loop, is_stable, linear_limit, spring_limit, stable_limit
 from hapticd_studies.published.finding import Finding
 from hapticd_studies.published.presses import felt, points, settled
@@ -31,7 +32,19 @@ PHANTOM: dict[str, Any] = {
 DIOLAITI = "Diolaiti, Niemeyer, Barbagli & Salisbury 2006, PHANToM 1.0 (identified values known second hand)"
 CHOI = "Choi & Tan 2004, PHANToM 1.0A, largest stiffness that does not buzz (abstract read)"
 BROWN = "Brown 1995, thesis, one axis, 16 set-ups (two sections read; plots not seen)"
+DIAZ = "Diaz & Gil 2010, LHIfAM and PHANToM, 11-parameter models (abstract read)"
+GIL = "Gil 2010, PHANToM 1.0, two modes (abstract read)"
 PAPER = "energy-cycle paper, Omega.7 at 1 kHz"
+
+_HANDS = {"X": (380.0, 1.84), "Y": (552.0, 3.61), "Z": (770.0, 0.78)}
+"""Spring [N/m] and damping [N s/m] of a pen grip, by axis (Fu & Cavusoglu 2012, known second hand)."""
+
+_MODES = tuple(
+    Flexible(frequency_hz=hertz, handle_share=share, damping_ratio=0.02)
+    for hertz in (150.0, 200.0)
+    for share in (0.3, 0.5)
+)
+_MODE_WORDS = "0.075 kg with a mode at 150 or 200 Hz, 0.3 or 0.5 of the mass behind the spring, 2 % damping"
 
 _FRICTION_N = (2.0 * PHANTOM["coulomb_n"] / PHANTOM["resolution_m"], 2.0 * PHANTOM["viscous_n_s_per_m"] / PERIOD_S)
 _STIFFNESSES = (100.0, 200.0, 500.0, 1000.0, 1500.0, 2000.0, 2300.0, 2576.0, 3000.0, 4000.0)
@@ -75,16 +88,76 @@ def rate(lag_s: float = 1.10e-3, viscous_n_s_per_m: float = 1.01) -> Finding:
     slow_s, fast_s, published = 1.0 / 250.0, 1.0 / 40_000.0, 904.0 / 325.0
     rigid = spring_limit(0.1, viscous_n_s_per_m, fast_s) / spring_limit(0.1, viscous_n_s_per_m, slow_s)
     lagging = (0.5 * slow_s + lag_s) / (0.5 * fast_s + lag_s)
-    late = linear_limit(Loop(0.1, viscous_n_s_per_m, fast_s, delay_samples=round(lag_s / fast_s)))
+    slow, late = (linear_limit(Loop(0.1, viscous_n_s_per_m, t_s, late_s=lag_s)) for t_s in (slow_s, fast_s))
     return Finding(
         "rate",
         CHOI,
         f"325 N/m at 250 Hz, 904 at 40 kHz: {published:.2f} times",
         f"a rigid device without lag: {rigid:.0f} times, as 1/T. K = b/(T/2 + L) meets both with b 1.01 N s/m and a "
-        f"lag of 1.10 ms ({lagging:.2f} times; the loop at 40 kHz, 44 samples late: {late:.0f} N/m), but two numbers "
+        f"lag of 1.10 ms ({lagging:.2f} times; the loop with that lag: {slow:.0f} and {late:.0f} N/m), but two numbers "
         "that fit two numbers test nothing",
         abs(rigid / published - 1.0) < 0.25,
-        {"published_ratio": published, "rigid_ratio": rigid, "lagging_ratio": lagging, "late_limit_n_per_m": late},
+        {
+            "published_ratio": published,
+            "rigid_ratio": rigid,
+            "lagging_ratio": lagging,
+            "late_limit_n_per_m": [slow, late],
+        },
+    )
+
+
+def rate_advice(lag_s: float = 1.10e-3, viscous_n_s_per_m: float = 1.01) -> Finding:
+    """With the lag that the two stiffnesses ask for, what the rates between them are worth."""
+    limits = {
+        hz: linear_limit(Loop(0.1, viscous_n_s_per_m, 1.0 / hz, late_s=lag_s)) for hz in (1e3, 5e3, 10e3, 40e3, 160e3)
+    }
+    five, ten, beyond = (limits[hz] / limits[40e3] for hz in (5e3, 10e3, 160e3))
+    return Finding(
+        "rate-advice",
+        CHOI,
+        "their advice for hard surfaces: 5-10 kHz",
+        f"a rigid device whose force comes {lag_s * 1e3:.2f} ms late: {limits[1e3]:.0f} N/m at 1 kHz; 5 and 10 kHz "
+        f"hold {100.0 * five:.0f} and {100.0 * ten:.0f} % of what 40 kHz does, 160 kHz {100.0 * beyond:.0f} %",
+        five > 0.9 and ten > 0.95 and beyond < 1.1,
+        {"limit_by_rate_hz": limits, "lag_s": lag_s},
+    )
+
+
+def mode_when_held() -> Finding:
+    """What a flexible mode does to the limit of a spring, in a hand and without one."""
+    held = {
+        axis: [_phantom_limit(mode, damping, spring) for mode in (None, *_MODES)]
+        for axis, (spring, damping) in _HANDS.items()
+    }
+    free = [_phantom_limit(mode) for mode in (None, *_MODES)]
+    changes = {axis: max(abs(one / rigid - 1.0) for one in others) for axis, (rigid, *others) in held.items()}
+    alone = max(abs(one / free[0] - 1.0) for one in free[1:])
+    return Finding(
+        "mode-when-held",
+        DIAZ,
+        "the vibration mode decides the stiffness limit when the device is held",
+        f"{_MODE_WORDS}, pen grips: the limit changes by up to "
+        + ", ".join(f"{100.0 * change:.0f} % ({axis})" for axis, change in changes.items())
+        + f"; without a hand by {100.0 * alone:.1f} %. Mostly upwards, and mass, mode and grip are assumed",
+        max(changes.values()) > 0.25 and alone < 0.02,
+        {"held_n_per_m": held, "free_n_per_m": free},
+    )
+
+
+def modes_shrink_region(dampings: Sequence[float] = tuple(range(5, 151, 5))) -> Finding:
+    """What a flexible mode leaves of the region of stiffness and wall damping."""
+    rigid, *others = (
+        sum(_phantom_limit(mode, wall=float(damping)) for damping in dampings) for mode in (None, *_MODES)
+    )
+    shares = [one / rigid for one in others]
+    return Finding(
+        "modes-shrink-region",
+        GIL,
+        "vibration modes shrink the stable region of stiffness and damping",
+        f"{_MODE_WORDS}, no hand: the region has {100.0 * min(shares):.0f} to {100.0 * max(shares):.0f} % of its area "
+        "left; one mode and not two, its values assumed",
+        max(shares) < 0.8,
+        {"area_shares": shares},
     )
 
 
@@ -156,7 +229,7 @@ def rate_takes_damping(resolution_m: float = 3e-5) -> Finding:
         "a higher rate allows less wall damping",
         f"the stable damping grows from {linear[500]:.0f} N s/m at 500 Hz to {linear[4000]:.0f} at 4 kHz, and with "
         f"steps of {resolution_m * 1e6:.0f} um 100 N s/m is felt {felt_by_rate[500]:.0f} and {felt_by_rate[4000]:.0f} "
-        "times the threshold; a current loop or a flexible handle, which the model has not, may be what he met",
+        "times the threshold; a current loop or a flexible handle may be what he met",
         linear[4000] < linear[500] or felt_by_rate[4000] > felt_by_rate[500],
         {"stable_damping_by_rate_hz": linear, "felt_by_rate_hz": felt_by_rate},
     )
@@ -212,6 +285,9 @@ ROWS = (
     friction_limit,
     friction_limit_pressed,
     rate,
+    rate_advice,
+    mode_when_held,
+    modes_shrink_region,
     native_limit,
     damper_widens,
     rate_gives_stiffness,
@@ -219,6 +295,12 @@ ROWS = (
     encoder_keeps_limit,
     velocity_filter,
 )
+
+
+def _phantom_limit(mode: Flexible | None, hand: float = 0.0, spring: float = 0.0, wall: float = 0.0) -> float:
+    """The stiffest wall that a device of the PHANToM's kind holds [N/m]."""
+    loop = Loop(0.075, 0.005, PERIOD_S, wall, hand_n_per_m=spring, hand_n_s_per_m=hand, flexible=mode)
+    return stable_limit(loop)
 
 
 def _settled_by_stiffness(device: dict[str, Any], hand_n: float, stiffnesses: Sequence[float]) -> dict[float, int]:

@@ -56,6 +56,8 @@ def table(scene: Scene) -> Table:
 
 def sentences(scene: Scene, ticks: Sequence[TickCount]) -> Iterator[str]:
     """What it comes to, a line each."""
+    felt = "" if math.isnan(scene.full.felt_index) else f"felt {scene.full.felt_index:.2g} times the threshold, "
+    yield f"The full model: {scene.full.outcome.words}, {felt}force chatter {scene.full.force_chatter_n:.3g} N."
     gone = ", ".join(term.name for term in scene.left_out)
     yield (
         f"Within {100.0 * scene.tolerance:g} % this scene needs {len(scene.removals) - len(scene.left_out)} of its "
@@ -91,6 +93,8 @@ def json(scene: Scene, ticks: Sequence[TickCount], duration_s: float) -> bytes:
             "criterion": Criterion().declared(),
             "full": {
                 "verdict": scene.full.outcome.words,
+                "felt_index": scene.full.felt_index,
+                "force_chatter_n": scene.full.force_chatter_n,
                 "settled_s": scene.full.settled_s,
                 "peak_force_n": scene.full.peak_force_n,
                 "displayed_stiffness_n_per_m": scene.full.displayed_stiffness_n_per_m,
