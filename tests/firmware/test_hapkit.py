@@ -95,14 +95,17 @@ BEND = 0.1
 @pytest.fixture(scope="module")
 def with_table(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """A board whose table has been measured on a sensor that is bent."""
-    shares = [step / 2000 for step in range(2001)]
-    shown = [share + BEND * math.sin(2.0 * math.pi * share) / (2.0 * math.pi) for share in shares]
-    table = [round(1024 * shares[min(range(2001), key=lambda at: abs(shown[at] - node / 16))]) for node in range(17)]
+    shares = [step / 1000 for step in range(-100, 1101)]
+    raws = [15 + 965 * (share + BEND * math.sin(2.0 * math.pi * share) / (2.0 * math.pi)) for share in shares]
+    nearest = [min(range(len(raws)), key=lambda at, node=node: abs(raws[at] - 64 * node)) for node in range(17)]
+    table = [round(1024 * shares[at]) for at in nearest]
     firmware = tmp_path_factory.mktemp("table") / "firmware"
     for folder in ("protocol", "serial-rig"):
         shutil.copytree(FIRMWARE / folder, firmware / folder)
     board_h = firmware / "serial-rig" / "hapkit" / "board.h"
-    text, found = re.subn("#define TABLE .*", f"#define TABLE {{{', '.join(map(str, table))}}}", board_h.read_text())
+    text, found = re.subn(
+        r"#define TABLE {[^}]*}", f"#define TABLE {{{', '.join(map(str, table))}}}", board_h.read_text()
+    )
     assert found == 1
     board_h.write_text(text)
     return build(firmware.parent, "hapkit", firmware)

@@ -12,11 +12,11 @@ enum {
     SPAN = HIGHEST_RAW - LOWEST_RAW,
     MOST_STEP = 40, /* between two conversions: 5.6 m/s at the handle, faster than any hand */
     MOST_MISSED = 7,
-    SEGMENTS = 16,
+    NODE_SHIFT = 6, /* a node of the table every 64 readings */
 };
 _Static_assert((MOST_MISSED + 1) * MOST_STEP < SPAN / 2, "which way it went would not be clear");
 
-static const int16_t table[SEGMENTS + 1] = TABLE;
+static const int16_t table[(1024 >> NODE_SHIFT) + 1] = TABLE;
 
 static volatile int16_t believed;  /* the last reading that made sense */
 static volatile int16_t half_turns;
@@ -71,13 +71,9 @@ int32_t sensor_counts(void)
         raw = believed;
         turns = half_turns;
     }
-    int16_t above = raw < LOWEST_RAW ? 0 : raw > HIGHEST_RAW ? SPAN : raw - LOWEST_RAW;
-    int16_t segment = above * SEGMENTS / SPAN;
-    if (segment == SEGMENTS) {
-        segment--;
-    }
-    int32_t into = (int32_t)above * SEGMENTS - (int32_t)segment * SPAN;
-    int16_t counts = (int16_t)(table[segment] + into * (table[segment + 1] - table[segment]) / SPAN);
+    uint8_t node = (uint8_t)(raw >> NODE_SHIFT);
+    int16_t beyond = raw & ((1 << NODE_SHIFT) - 1);
+    int16_t counts = (int16_t)(table[node] + (beyond * (table[node + 1] - table[node]) >> NODE_SHIFT));
     return (int32_t)turns * HALF_TURN_COUNTS + counts;
 }
 

@@ -21,11 +21,13 @@
 #define HANDLE_M 70.0e-3
 #define SHAFT_RAD_PER_M (SECTOR_M / (HANDLE_M * PULLEY_M))
 
-/* The sensor: readings of the converter at the two ends of a half turn, and the angle in between, in counts at 17 equally
- * spaced readings; these are a straight line. docs/hapkit.md says how to measure yours. */
+/* The sensor: readings of the converter at the two ends of a half turn, and the angle in counts at the readings 0, 64, 128
+ * to 1024. As it stands a straight line; docs/hapkit.md says when yours needs other numbers. */
 #define LOWEST_RAW 15
 #define HIGHEST_RAW 980
-#define TABLE {0, 64, 128, 192, 256, 320, 384, 448, 512, 576, 640, 704, 768, 832, 896, 960, 1024}
+#define LINE(raw) ((int16_t)(((raw) - LOWEST_RAW) * 1024L / (HIGHEST_RAW - LOWEST_RAW)))
+#define TABLE {LINE(0), LINE(64), LINE(128), LINE(192), LINE(256), LINE(320), LINE(384), LINE(448), LINE(512), \
+               LINE(576), LINE(640), LINE(704), LINE(768), LINE(832), LINE(896), LINE(960), LINE(1024)}
 /* A reading outside of these is a broken wire. */
 #define ALIVE_FROM_RAW 5
 #define ALIVE_TO_RAW 1015

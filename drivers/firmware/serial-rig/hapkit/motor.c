@@ -10,17 +10,22 @@ enum { STEPS = 256, SHIFT = 15 };
 /* STEPS^2 at full force; with as many binary places as fit. */
 #define PER_UN (((uint32_t)STEPS * STEPS << SHIFT) / MAX_FORCE_UN)
 
-/* Rounded to the nearest. */
-static uint16_t square_root(uint32_t value)
+/* Rounded to the nearest, of at most STEPS^2. */
+static uint16_t square_root(uint32_t square)
 {
-    uint16_t root = 0;
-    for (uint16_t bit = STEPS; bit != 0; bit >>= 1) {
-        uint32_t trial = root | bit;
-        if (trial * trial <= value) {
-            root = (uint16_t)trial;
+    if (square > 65280) { /* 255.5^2 */
+        return STEPS;
+    }
+    uint16_t value = (uint16_t)square;
+    uint8_t root = 0;
+    for (uint8_t bit = 128; bit != 0; bit >>= 1) {
+        uint8_t trial = root | bit;
+        if ((uint16_t)trial * trial <= value) {
+            root = trial;
         }
     }
-    return value > (uint32_t)root * root + root ? root + 1 : root;
+    uint16_t below = (uint16_t)root * root;
+    return value - below > root ? (uint16_t)(root + 1) : root;
 }
 
 void motor_start(void)
@@ -46,6 +51,6 @@ void motor_drive(int32_t force_un)
         TCCR0A &= (uint8_t)~(1 << COM0B1);
         return;
     }
-    OCR0B = (uint8_t)((steps > STEPS ? STEPS : steps) - 1);
+    OCR0B = (uint8_t)(steps - 1);
     TCCR0A |= 1 << COM0B1;
 }
