@@ -12,7 +12,7 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check -
 
 # What tests and examples use besides Python; one list for this file, CI and the README.
 PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev systemd-container debootstrap \
-    umockdev libumockdev-dev libusb-1.0-0 valgrind iproute2 gcc-avr avr-libc libsimavr-dev clang libclang-rt-dev \
+    umockdev libumockdev-dev libusb-1.0-0 valgrind iproute2 gcc-avr avr-libc libsimavr-dev clang libclang-rt-dev lld \
     strace bash-completion zsh fish mandoc \
     chromium $(if $(shell command -v npm 2>/dev/null),,npm)
 

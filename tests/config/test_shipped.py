@@ -17,7 +17,7 @@ from hapticd.tick.assemble import make_tick, place_device
 
 SHIPPED = sorted(directory("config").glob("*.toml"))
 REAL_DEVICES = {name: name for name in ("hid-rig", "inverse3", "moteus", "odrive", "omega7", "serial-rig")}
-REAL_DEVICES |= {"hapkit": "serial-rig"}
+REAL_DEVICES |= {"hapkit": "serial-rig", "falcon": "omega7"}
 RESTS = ["fig6-set1", "fig6-set2-wall", "fig6-set2-device", "native-8-none", "every-term"] + [
     f"wall-{k}-{law}" for k in (12, 18, 20) for law in ("energy-cycle", "tdpa")
 ]

@@ -18,9 +18,18 @@ from hapticd.tick.guard import Mode
 from hapticd.tick.motion import FROZEN_S
 from hapticd.tick.tick import ControlTick
 from hapticd_drivers.forcedimension.driver import ForceDimension
+from hapticd_drivers.forcedimension.models import MODELS
 from tests.drivers.forcedimension.bench import BRAKE, FORCE, Bench
 
 STATUS_TICKS = 10  # the default of status_every_ticks
+OMEGA7, FALCON = 35, 60
+
+
+@pytest.fixture(params=[OMEGA7, FALCON], ids=["omega7", "falcon"])
+def kind(request: pytest.FixtureRequest, bench: Bench) -> int:
+    """Which device is on the bench: every fault is tried on each, but for what a device cannot do."""
+    bench.set(type=request.param, motor_n=MODELS[request.param].max_force_n)
+    return int(request.param)
 
 
 def pressing(bench: Bench) -> ForceDimension:
@@ -58,13 +67,26 @@ def overspeed(bench: Bench) -> None:
     [
         (Bench.press_force_button, "the force button on the device was pressed"),
         (overspeed, "the device's own velocity limit was exceeded"),
-        (lambda bench: bench.advance(11_000), "the device's watchdog heard nothing from this computer in time"),
         (lambda bench: bench.set(error=3), "the device reports an error of its own (3)"),
     ],
 )
+@pytest.mark.usefixtures("kind")
 def test_a_stop_of_the_device_is_noticed_within_the_status_ticks_and_named(
     bench: Bench, happen: Callable[[Bench], None], text: str
 ) -> None:
+    stops(bench, happen, text)
+
+
+def test_a_stop_by_its_watchdog_is_noticed_and_named_too(bench: Bench) -> None:
+    stops(
+        bench,
+        lambda bench: bench.advance(11_000),
+        "the device's watchdog heard nothing from this computer in time",
+    )
+
+
+def stops(bench: Bench, happen: Callable[[Bench], None], text: str) -> None:
+    """The device stops by itself, the driver says so, and forces come back only when they are enabled anew."""
     driver = pressing(bench)
     happen(bench)
     assert ticks_until_fault(driver, DeviceFaultError, text) <= STATUS_TICKS + 1
@@ -93,10 +115,21 @@ def test_the_watchdog_takes_the_force_away_while_nobody_calls(bench: Bench) -> N
     driver.close()
 
 
-@pytest.mark.parametrize("device_type", [35, 60])
+def test_a_falcon_keeps_its_force_while_nobody_calls(bench: Bench) -> None:
+    """Which is why it needs device.accept_no_watchdog."""
+    bench.set(type=FALCON, motor_n=MODELS[FALCON].max_force_n)
+    driver = pressing(bench)
+    assert driver.info.host_silence_ms is None
+    bench.advance(1e6)
+    assert (bench.get("mode"), bench.get("force_n", index=2)) == (FORCE, 2.0)
+    driver.disable()
+    assert bench.vector("force_n") == [0.0, 0.0, 0.0]
+    driver.close()
+
+
+@pytest.mark.usefixtures("kind")
 @pytest.mark.parametrize("first", ["read", "write"])
-def test_an_unplugged_device_is_noticed_by_the_next_call(bench: Bench, first: str, device_type: int) -> None:
-    bench.set(type=device_type)
+def test_an_unplugged_device_is_noticed_by_the_next_call(bench: Bench, first: str) -> None:
     driver = pressing(bench)
     bench.set(present=0)
     call = driver.read if first == "read" else lambda: driver.write([0.0, 0.0, 0.0])
@@ -110,6 +143,24 @@ def test_an_unplugged_device_is_noticed_by_the_next_call(bench: Bench, first: st
     driver.open()
     driver.read()
     assert bench.get("mode") != FORCE
+    driver.close()
+
+
+def test_a_falcon_that_comes_back_takes_forces_again_only_when_they_are_enabled(bench: Bench) -> None:
+    """It has nothing to calibrate, so nothing else stands before them."""
+    bench.set(type=FALCON, motor_n=MODELS[FALCON].max_force_n, calibrated=0)
+    driver = pressing(bench)
+    bench.set(present=0)
+    with pytest.raises(DeviceDisconnectedError):
+        driver.read()
+    driver.close()
+    bench.set(present=1)
+    driver.open()
+    driver.read()
+    assert bench.get("mode") != FORCE
+    driver.enable()
+    driver.write([0.0, 0.0, 1.0])
+    assert (bench.get("mode"), bench.get("force_n", index=2)) == (FORCE, 1.0)
     driver.close()
 
 
@@ -129,6 +180,7 @@ def test_a_device_that_lost_its_calibration_while_it_was_away_takes_no_force(ben
 CONFIG = """
 [device]
 driver = "omega7"
+accept_no_watchdog = true
 [[scene.walls]]
 stiffness_n_per_m = 2000.0
 [safety]
@@ -168,6 +220,7 @@ def until_disarmed(driver: ForceDimension, tick: ControlTick) -> int:
     raise AssertionError("still armed")
 
 
+@pytest.mark.usefixtures("kind")
 def test_data_that_is_never_new_is_a_frozen_device(bench: Bench) -> None:
     driver, tick = armed(bench)
     bench.set(stale=1)
@@ -177,6 +230,7 @@ def test_data_that_is_never_new_is_a_frozen_device(bench: Bench) -> None:
     driver.close()
 
 
+@pytest.mark.usefixtures("kind")
 @pytest.mark.parametrize("garbage", [1, 2])
 def test_garbage_is_an_impossible_sample_and_the_force_is_out_within_10_ms(bench: Bench, garbage: int) -> None:
     driver, tick = armed(bench)
@@ -187,6 +241,7 @@ def test_garbage_is_an_impossible_sample_and_the_force_is_out_within_10_ms(bench
     driver.close()
 
 
+@pytest.mark.usefixtures("kind")
 def test_a_slow_call_is_waited_for_and_changes_nothing_else(bench: Bench) -> None:
     driver = pressing(bench)
     bench.set(slow_us=30_000, slow_calls=1)
@@ -198,6 +253,7 @@ def test_a_slow_call_is_waited_for_and_changes_nothing_else(bench: Bench) -> Non
     driver.close()
 
 
+@pytest.mark.usefixtures("kind")
 def test_a_device_that_repeats_one_position_as_new_cannot_be_told_from_one_that_stands_still(bench: Bench) -> None:
     """The SDK has no count and no clock of the device: docs/omega7.md says so."""
     driver, tick = armed(bench)

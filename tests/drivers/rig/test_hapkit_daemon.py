@@ -8,7 +8,7 @@ import signal
 import pytest
 
 from tests.daemon.running import Subscriber
-from tests.drivers.rig.serial_lab import Lab, on_a_board
+from tests.drivers.rig.serial_lab import HELD_M, Lab, on_a_board
 from tests.firmware.board import Built
 
 pytestmark = pytest.mark.timeout(300)
@@ -19,8 +19,8 @@ def board_parts(hapkit_parts: Built) -> Built:
     return hapkit_parts
 
 
-@on_a_board(-0.02, "low_stop")
-def test_a_hapkit_finds_its_stop_pushes_a_wall_and_is_without_force_when_the_loop_is_killed(lab: Lab) -> None:
+@on_a_board(HELD_M)
+def test_a_hapkit_is_calibrated_pushes_a_wall_and_is_without_force_when_the_loop_is_killed(lab: Lab) -> None:
     with Subscriber(lab.daemon.endpoint, "hapticd/status") as subscriber:
         status = subscriber.until("hapticd/status")
         assert (status["device"], status["serial"], status["armed"]) == ("hapkit", "0001", False)
