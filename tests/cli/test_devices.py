@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +45,16 @@ def test_each_device_has_a_line_and_below_it_what_is_to_be_known(
     assert (bad, why) == ("odd bad - 1-4 cannot be used", "nobody may open it")
     assert mend.removeprefix("sudo ") == "chmod it"
     assert ["loopback", "omega7", "model,", "simulated", "-", "-", "ready"] in [line.split() for line in shown]
+
+
+def test_every_driver_of_ours_is_asked_and_says_what_to_do_where_it_finds_none() -> None:
+    rows = listed()
+    families = {"omega7", "serial-rig", "hid-rig", "moteus", "odrive", "inverse3"}
+    assert {"loopback", *families} <= rows.keys()
+    assert not [name for name in families if rows[name].get("problem")]
+    shown = hapticd("devices").stdout
+    for name in families:
+        assert re.search(rf"^{name} ", shown, re.MULTILINE), name
 
 
 def test_a_driver_that_found_none_says_what_to_do_and_what_this_computer_lacks(

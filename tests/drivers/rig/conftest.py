@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from hapticd_drivers.rig import conversation
+from hapticd_drivers.rig.serial_rig import SerialRig, SerialRigOptions
 from tests.drivers.rig.device import PATIENCE_S, Rig, build
+from tests.drivers.rig.ticking import PERIOD_S, MakeDriver, tick
 from tests.firmware.board import Built
 from tests.firmware.board import build as build_board
 
@@ -36,3 +39,33 @@ def board_parts(tmp_path_factory: pytest.TempPathFactory) -> Built:
 @pytest.fixture(scope="session")
 def hapkit_parts(tmp_path_factory: pytest.TempPathFactory) -> Built:
     return build_board(tmp_path_factory.mktemp("hapkit"), "hapkit")
+
+
+@pytest.fixture
+def make_driver(rig: Rig) -> Iterator[MakeDriver]:
+    """Drivers that are closed in the end."""
+    with ExitStack() as closing:
+
+        def make(**options: object) -> SerialRig:
+            made = SerialRig(SerialRigOptions.model_validate({"port": str(rig.port), **options}), PERIOD_S)
+            closing.callback(made.close)
+            return made
+
+        yield make
+
+
+@pytest.fixture
+def driver(rig: Rig, make_driver: MakeDriver) -> SerialRig:
+    """A driver whose rig knows its home already, and whose sign was checked."""
+    rig.set_home()
+    return make_driver(sign_checked=True)
+
+
+@pytest.fixture
+def pushing(rig: Rig, driver: SerialRig) -> SerialRig:
+    """The same, pushing the handle with 1 N."""
+    driver.open()
+    driver.enable()
+    tick(rig, driver, 1.0)
+    assert rig.force_n == 1.0
+    return driver

@@ -21,7 +21,7 @@ STIFFNESS_N_PER_M = 2000.0
 PRESS_N = 2.0
 HELD_M = 0.02
 STOP_M = {"uno": -0.049, "hapkit": -0.034}
-"""Whoever is further down is at the lower stop [m]."""
+"""A handle that is further down is at the lower stop [m]."""
 
 ATTEMPTS = 5
 """A computer that is too busy may miss so many deadlines that the loop lets go, or starve the simulated processor until

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
-from hapticd.driver import DriverState
 from hapticd.errors import (
     ConfigError,
     DeviceBusyError,
@@ -19,75 +13,12 @@ from hapticd.errors import (
     DeviceFaultError,
     DeviceNotFoundError,
     DeviceTimeoutError,
-    DriverError,
     DriverStateError,
 )
 from hapticd_drivers.rig import conversation
-from hapticd_drivers.rig.metrics import METRICS
 from hapticd_drivers.rig.serial_rig import SerialRig, SerialRigOptions
-from tests.drivers.rig.device import COUNT_M, HALF_TRAVEL_M, Rig, Spoiler
-
-PERIOD_S = 0.001
-
-
-class MakeDriver(Protocol):
-    """Make a driver for the rig with these options."""
-
-    def __call__(self, **options: object) -> SerialRig: ...
-
-
-@pytest.fixture
-def make_driver(rig: Rig) -> Iterator[MakeDriver]:
-    """Drivers that are closed in the end."""
-    with ExitStack() as closing:
-
-        def make(**options: object) -> SerialRig:
-            made = SerialRig(SerialRigOptions.model_validate({"port": str(rig.port), **options}), PERIOD_S)
-            closing.callback(made.close)
-            return made
-
-        yield make
-
-
-@pytest.fixture
-def driver(rig: Rig, make_driver: MakeDriver) -> SerialRig:
-    """A driver whose rig knows its home already, and whose sign was checked."""
-    rig.set_home()
-    return make_driver(sign_checked=True)
-
-
-@pytest.fixture
-def pushing(rig: Rig, driver: SerialRig) -> SerialRig:
-    """The same, pushing the handle with 1 N."""
-    driver.open()
-    driver.enable()
-    tick(rig, driver, 1.0)
-    assert rig.force_n == 1.0
-    return driver
-
-
-def metric(driver: SerialRig, name: str) -> float:
-    return driver.metrics[[each.name for each in METRICS].index(name)]
-
-
-def tick(rig: Rig, driver: SerialRig, force_n: float = 0.0) -> float:
-    """One tick of an armed loop; the position. The rig has heard it, and its answer waits."""
-    position_m = driver.read().position_m[0]
-    driver.write([force_n])
-    rig.wait_for(driver)
-    return position_m
-
-
-def ticks(rig: Rig, driver: SerialRig, force_n: float = 0.0, count: int = 10) -> None:
-    for _ in range(count):
-        tick(rig, driver, force_n)
-
-
-def settle(rig: Rig, driver: SerialRig) -> float:
-    """Two ticks without force, so that the position is new."""
-    driver.read()
-    rig.wait_for(driver)
-    return driver.read().position_m[0]
+from tests.drivers.rig.device import COUNT_M, Rig
+from tests.drivers.rig.ticking import PERIOD_S, MakeDriver, metric, settle, tick, ticks
 
 
 def test_a_rig_that_does_not_know_where_it_is_takes_no_force(make_driver: MakeDriver) -> None:
@@ -110,91 +41,6 @@ def test_a_rig_whose_sign_nobody_has_checked_takes_no_force(rig: Rig, make_drive
     assert not driver.read().calibrated
 
 
-@pytest.mark.parametrize(
-    ("homing", "zero_at_m"),
-    [("low_stop", 0.0), ("high_stop", 0.0), ("low_switch", 0.5 * HALF_TRAVEL_M), ("high_switch", None), ("here", 0.01)],
-)
-def test_a_calibration_finds_home_and_the_rig_keeps_it(
-    rig: Rig, homing: str, zero_at_m: float | None, make_driver: MakeDriver
-) -> None:
-    if homing == "high_switch":
-        rig.plant.position_m = -0.04
-        rig.switch_at_m = -HALF_TRAVEL_M
-    driver = make_driver(axes=[{"homing": homing}], calibration_speed_m_per_s=0.1)
-    driver.open()
-    if zero_at_m is None:
-        with pytest.raises(DeviceFaultError, match="does not close"):
-            driver.calibrate()
-    else:
-        driver.calibrate()
-        assert settle(rig, driver) == pytest.approx(rig.plant.position_m - zero_at_m, abs=2.5e-4)
-        assert driver.read().calibrated
-        driver.enable()
-        assert driver.state is DriverState.ENABLED
-        driver.disable()
-        driver.close()
-        again = make_driver(sign_checked=True)
-        again.open()
-        again.enable()
-        assert tick(rig, again) == pytest.approx(rig.plant.position_m - zero_at_m, abs=3e-4)
-
-
-class Witness:
-    """Remembers the largest force and the farthest way of a rig."""
-
-    def __init__(self, rig: Rig) -> None:
-        self.most_n = 0.0
-        self.start_m = rig.plant.position_m
-        self.farthest_m = 0.0
-        advance = rig.plant.advance
-
-        def watched(motor_n: float, dt_s: float) -> None:
-            self.most_n = max(self.most_n, abs(motor_n))
-            advance(motor_n, dt_s)
-            self.farthest_m = max(self.farthest_m, abs(rig.plant.position_m - self.start_m))
-
-        rig.plant.advance = watched  # type: ignore[method-assign]  # only looks on
-
-
-@pytest.mark.parametrize(
-    ("spoilt", "says"),
-    [
-        ({"motor": -1.0}, "motor_reversed"),
-        ({"motor": 0.0}, "is its supply on"),
-        ({"friction_n": 2.0}, "more than the friction"),
-        ({"hand_n": 0.3}, "let go of it"),
-    ],
-)
-def test_what_is_wrong_with_a_motor_shows_at_harmless_force(
-    rig: Rig, spoilt: dict[str, float], says: str, make_driver: MakeDriver
-) -> None:
-    """A reversed motor moves the handle by half a millimetre and what it rolls on, at half a newton at most."""
-    for name, value in spoilt.items():
-        setattr(rig.plant, name, value)
-    witness = Witness(rig)
-    driver = make_driver(calibration_speed_m_per_s=0.1)
-    driver.open()
-    with pytest.raises(DeviceFaultError, match=says):
-        driver.calibrate()
-    assert rig.force_n == 0.0
-    assert witness.most_n <= 0.5
-    assert witness.farthest_m < 2e-3 or "hand_n" in spoilt
-    with pytest.raises(DriverStateError):
-        driver.enable()
-
-
-def test_a_reversed_motor_that_is_declared_passes_and_pushes_the_right_way(rig: Rig, make_driver: MakeDriver) -> None:
-    rig.plant.motor = -1.0
-    driver = make_driver(axes=[{"homing": "here", "motor_reversed": True}])
-    driver.open()
-    driver.calibrate()
-    driver.enable()
-    before_m = tick(rig, driver)
-    for _ in range(50):
-        after_m = tick(rig, driver, 0.5)
-    assert after_m > before_m + 1e-3
-
-
 def test_a_reversed_axis_turns_position_and_force(rig: Rig, make_driver: MakeDriver) -> None:
     rig.set_home()
     driver = make_driver(sign_checked=True, axes=[{"reversed": True}])
@@ -215,40 +61,6 @@ def test_the_force_constant_is_measured_at_the_handle(rig: Rig, make_driver: Mak
     driver.enable()
     tick(rig, driver, 2.5)
     assert rig.force_n == 2.0
-
-
-def test_a_calibration_that_is_called_off_leaves_no_force(rig: Rig, make_driver: MakeDriver) -> None:
-    driver = make_driver(axes=[{"homing": "low_stop"}], calibration_speed_m_per_s=0.005)
-    driver.open()
-    ended: list[BaseException] = []
-
-    def calibrate() -> None:
-        try:
-            driver.calibrate()
-        except DriverError as error:
-            ended.append(error)
-
-    thread = threading.Thread(target=calibrate)
-    thread.start()
-    while rig.force_n == 0.0:
-        driver.read()  # the loop goes on
-        time.sleep(PERIOD_S)
-    driver.close()
-    thread.join(30.0)
-    assert "called off" in str(ended[0])
-    assert rig.force_n == 0.0
-
-
-def test_positions_go_on_while_it_is_calibrated(make_driver: MakeDriver) -> None:
-    driver = make_driver(axes=[{"homing": "here"}])
-    driver.open()
-    thread = threading.Thread(target=driver.calibrate)
-    seen = {driver.read().position_m[0]}
-    thread.start()
-    while thread.is_alive():
-        seen.add(driver.read().position_m[0])
-        time.sleep(PERIOD_S)
-    assert len(seen) > 20
 
 
 def test_when_the_host_is_silent_the_rig_drops_its_force_and_wants_to_be_enabled_anew(
@@ -406,98 +218,3 @@ def test_what_does_not_fit_the_rig_is_refused_by_its_key(
 ) -> None:
     with pytest.raises(ConfigError, match=says):
         make_driver(**options).open()
-
-
-def now_us() -> float:
-    return time.monotonic_ns() * 1e-3
-
-
-def test_the_echo_is_timed(rig: Rig, driver: SerialRig) -> None:
-    begun_us = now_us()
-    driver.open()
-    assert 0.0 < metric(driver, "round_trip_us") <= now_us() - begun_us
-    driver.enable()
-    for waits_s in (0.02, 0.0):
-        sent_us = now_us()
-        tick(rig, driver)
-        time.sleep(waits_s)
-        driver.read()
-        assert 1e6 * waits_s < metric(driver, "echo_us") <= now_us() - sent_us
-    assert 20e3 < metric(driver, "longest_echo_us") <= now_us() - begun_us
-
-
-class Once:
-    """Changes the first bytes that it sees, and no others."""
-
-    def __init__(self, change: Spoiler) -> None:
-        self.change = change
-        self.done = False
-
-    def __call__(self, data: bytes) -> bytes:
-        if self.done:
-            return data
-        self.done = True
-        return self.change(data)
-
-
-class Swap:
-    """Holds the first frame back until after the second one."""
-
-    def __init__(self) -> None:
-        self.held: bytes | None = None
-        self.done = False
-
-    def __call__(self, data: bytes) -> bytes:
-        if self.done or not data:
-            return data
-        if self.held is None:
-            self.held = data
-            return b""
-        self.done = True
-        return data + self.held
-
-
-@pytest.mark.parametrize(
-    ("spoil", "counted"),
-    [
-        (Once(lambda data: b""), {"lost_frames": 1.0}),
-        (Once(lambda data: bytes([data[0] ^ 1]) + data[1:]), {"damaged_frames": 1.0, "lost_frames": 1.0}),
-        (Once(lambda data: data + data), {"repeated_frames": 1.0}),
-        (Swap(), {"lost_frames": 1.0, "late_frames": 1.0}),
-    ],
-    ids=["lost", "damaged", "repeated", "late"],
-)
-def test_each_kind_of_trouble_on_the_way_here_is_counted(
-    rig: Rig, driver: SerialRig, spoil: Spoiler, counted: dict[str, float]
-) -> None:
-    driver.open()
-    driver.enable()
-    for _ in range(10):
-        tick(rig, driver)
-    rig.up = spoil
-    for _ in range(30):
-        tick(rig, driver)
-    troubles = {each.name: metric(driver, each.name) for each in METRICS if each.warns and metric(driver, each.name)}
-    assert troubles == counted
-
-
-@pytest.mark.parametrize(
-    ("spoil", "counted"),
-    [
-        (Once(lambda data: b""), {"commands_lost": 1.0}),
-        (Once(lambda data: bytes([data[0] ^ 1]) + data[1:]), {"commands_damaged": 1.0, "commands_lost": 1.0}),
-        (Once(lambda data: data + data), {"commands_stale": 1.0}),
-    ],
-    ids=["lost", "damaged", "stale"],
-)
-def test_each_kind_of_trouble_on_the_way_there_is_told_within_a_second(
-    rig: Rig, driver: SerialRig, spoil: Spoiler, counted: dict[str, float]
-) -> None:
-    driver.open()
-    driver.enable()
-    tick(rig, driver)
-    rig.down = spoil
-    for _ in range(round(1.1 / PERIOD_S)):
-        tick(rig, driver)
-    troubles = {each.name: metric(driver, each.name) for each in METRICS if each.warns and metric(driver, each.name)}
-    assert troubles == counted

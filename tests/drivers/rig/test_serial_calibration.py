@@ -1,0 +1,136 @@
+"""The serial rig's calibration: home, and the sign of the motor."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from hapticd.driver import DriverState
+from hapticd.errors import (
+    DeviceFaultError,
+    DriverError,
+    DriverStateError,
+)
+from tests.drivers.rig.device import HALF_TRAVEL_M, Rig
+from tests.drivers.rig.ticking import PERIOD_S, MakeDriver, settle, tick
+
+
+@pytest.mark.parametrize(
+    ("homing", "zero_at_m"),
+    [("low_stop", 0.0), ("high_stop", 0.0), ("low_switch", 0.5 * HALF_TRAVEL_M), ("high_switch", None), ("here", 0.01)],
+)
+def test_a_calibration_finds_home_and_the_rig_keeps_it(
+    rig: Rig, homing: str, zero_at_m: float | None, make_driver: MakeDriver
+) -> None:
+    if homing == "high_switch":
+        rig.plant.position_m = -0.04
+        rig.switch_at_m = -HALF_TRAVEL_M
+    driver = make_driver(axes=[{"homing": homing}], calibration_speed_m_per_s=0.1)
+    driver.open()
+    if zero_at_m is None:
+        with pytest.raises(DeviceFaultError, match="does not close"):
+            driver.calibrate()
+    else:
+        driver.calibrate()
+        assert settle(rig, driver) == pytest.approx(rig.plant.position_m - zero_at_m, abs=2.5e-4)
+        assert driver.read().calibrated
+        driver.enable()
+        assert driver.state is DriverState.ENABLED
+        driver.disable()
+        driver.close()
+        again = make_driver(sign_checked=True)
+        again.open()
+        again.enable()
+        assert tick(rig, again) == pytest.approx(rig.plant.position_m - zero_at_m, abs=3e-4)
+
+
+class Witness:
+    """Remembers the largest force and the farthest way of a rig."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.most_n = 0.0
+        self.start_m = rig.plant.position_m
+        self.farthest_m = 0.0
+        advance = rig.plant.advance
+
+        def watched(motor_n: float, dt_s: float) -> None:
+            self.most_n = max(self.most_n, abs(motor_n))
+            advance(motor_n, dt_s)
+            self.farthest_m = max(self.farthest_m, abs(rig.plant.position_m - self.start_m))
+
+        rig.plant.advance = watched  # type: ignore[method-assign]  # only looks on
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "says"),
+    [
+        ({"motor": -1.0}, "motor_reversed"),
+        ({"motor": 0.0}, "is its supply on"),
+        ({"friction_n": 2.0}, "more than the friction"),
+        ({"hand_n": 0.3}, "let go of it"),
+    ],
+)
+def test_what_is_wrong_with_a_motor_shows_at_harmless_force(
+    rig: Rig, spoilt: dict[str, float], says: str, make_driver: MakeDriver
+) -> None:
+    """A reversed motor moves the handle by half a millimetre and what it rolls on, at half a newton at most."""
+    for name, value in spoilt.items():
+        setattr(rig.plant, name, value)
+    witness = Witness(rig)
+    driver = make_driver(calibration_speed_m_per_s=0.1)
+    driver.open()
+    with pytest.raises(DeviceFaultError, match=says):
+        driver.calibrate()
+    assert rig.force_n == 0.0
+    assert witness.most_n <= 0.5
+    assert witness.farthest_m < 2e-3 or "hand_n" in spoilt
+    with pytest.raises(DriverStateError):
+        driver.enable()
+
+
+def test_a_reversed_motor_that_is_declared_passes_and_pushes_the_right_way(rig: Rig, make_driver: MakeDriver) -> None:
+    rig.plant.motor = -1.0
+    driver = make_driver(axes=[{"homing": "here", "motor_reversed": True}])
+    driver.open()
+    driver.calibrate()
+    driver.enable()
+    before_m = tick(rig, driver)
+    for _ in range(50):
+        after_m = tick(rig, driver, 0.5)
+    assert after_m > before_m + 1e-3
+
+
+def test_a_calibration_that_is_called_off_leaves_no_force(rig: Rig, make_driver: MakeDriver) -> None:
+    driver = make_driver(axes=[{"homing": "low_stop"}], calibration_speed_m_per_s=0.005)
+    driver.open()
+    ended: list[BaseException] = []
+
+    def calibrate() -> None:
+        try:
+            driver.calibrate()
+        except DriverError as error:
+            ended.append(error)
+
+    thread = threading.Thread(target=calibrate)
+    thread.start()
+    while rig.force_n == 0.0:
+        driver.read()  # the loop goes on
+        time.sleep(PERIOD_S)
+    driver.close()
+    thread.join(30.0)
+    assert "called off" in str(ended[0])
+    assert rig.force_n == 0.0
+
+
+def test_positions_go_on_while_it_is_calibrated(make_driver: MakeDriver) -> None:
+    driver = make_driver(axes=[{"homing": "here"}])
+    driver.open()
+    thread = threading.Thread(target=driver.calibrate)
+    seen = {driver.read().position_m[0]}
+    thread.start()
+    while thread.is_alive():
+        seen.add(driver.read().position_m[0])
+        time.sleep(PERIOD_S)
+    assert len(seen) > 20
