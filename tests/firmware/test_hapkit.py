@@ -97,8 +97,10 @@ def with_table(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """A board whose table has been measured on a sensor that is bent."""
     shares = [step / 1000 for step in range(-100, 1101)]
     raws = [15 + 965 * (share + BEND * math.sin(2.0 * math.pi * share) / (2.0 * math.pi)) for share in shares]
-    nearest = [min(range(len(raws)), key=lambda at, node=node: abs(raws[at] - 64 * node)) for node in range(17)]
-    table = [round(1024 * shares[at]) for at in nearest]
+    table = [
+        round(1024 * min((abs(raw - 64 * node), share) for raw, share in zip(raws, shares, strict=True))[1])
+        for node in range(17)
+    ]
     firmware = tmp_path_factory.mktemp("table") / "firmware"
     for folder in ("protocol", "serial-rig"):
         shutil.copytree(FIRMWARE / folder, firmware / folder)
