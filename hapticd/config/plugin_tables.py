@@ -26,7 +26,7 @@ class ControllerConfig(Table):
     """[controller]: which law, and its own parameters."""
 
     law: str = Field(
-        "energy-cycle",
+        "ring-damping",
         min_length=1,
         description="installed law or importable module, see `hapticd controllers`",
     )

@@ -34,12 +34,12 @@ def test_every_daemon_that_lives_is_shown_and_what_a_killed_one_left_is_not(tmp_
                 shown = json.loads(status(runtime, "--json").stdout)
                 one, other = shown["instances"]
                 assert (shown["schema"], one["name"], other["name"]) == (1, "default", "left")
-                assert (one["status"]["law"], other["status"]["law"]) == ("energy-cycle", "tdpa")
+                assert (one["status"]["law"], other["status"]["law"]) == ("ring-damping", "tdpa")
                 assert began_s - 1.0 < one["status"]["started_timestamp"] < time.time()
                 assert 0.0 <= one["late_share"] <= 1.0
                 plain = status(runtime)
                 assert plain.returncode == 0
-                assert plain.stdout.startswith("default: armed, law energy-cycle, ")
+                assert plain.stdout.startswith("default: armed, law ring-damping, ")
                 assert "\nleft: " in plain.stdout
                 assert status(runtime, "--instance", "left").stdout.startswith("left: ")
             finally:

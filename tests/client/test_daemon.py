@@ -79,7 +79,7 @@ def test_only_the_topics_asked_for_are_iterated_and_the_status_is_there_all_the_
     with connect(topics=["position"], timeout_s=PATIENCE_S) as daemon:
         assert {type(record) for record in islice(daemon, 100)} == {Position}
         status = daemon.status()
-        assert (status.law, status.every_ticks, status.simulated) == ("energy-cycle", 1, True)
+        assert (status.law, status.every_ticks, status.simulated) == ("ring-damping", 1, True)
         assert status.seq >= 0
         assert status.timestamp > 0.0
 

@@ -12,11 +12,13 @@ from hypothesis import strategies as st
 
 from hapticd.config.editing import with_edits, with_law
 from hapticd.config.loading import parse
+from hapticd.config.plugin_tables import ControllerConfig
 from hapticd.errors import ConfigError
 from hapticd.paths import directory
 from tests.examples import examples
 
 REFERENCE = (directory("config") / "hapticd.toml").read_text()
+DEFAULT = ControllerConfig().law
 
 LAYOUTS = {
     "the reference": REFERENCE,
@@ -25,7 +27,7 @@ LAYOUTS = {
     "no line end": "[loop]\nrate_hz = 1000.0",
     "an empty table": "[controller]\n# which law\n\n# limits\n[safety]\nramp_s = 0.1\n",
     "no parameters": "[controller] # c\nlaw = 'energy-cycle' # l\n\n[[scene.walls]]\nstiffness_n_per_m = 1.0\n",
-    "parameters only": "[controller.params]\nwindow = 2 # w\n\n# limits\n[safety]\nramp_s = 0.1\n",
+    "parameters only": "[controller.params]\nbrake_ratio = 0.5 # w\n\n# limits\n[safety]\nramp_s = 0.1\n",
     "far apart": "[controller]\nlaw = 'energy-cycle'\n[loop]\ncpu = 0\n[controller.params]\n# head\nwindow = 2\n",
     "backwards": "[controller.params]\nwindow = 2\n[loop]\ncpu = 0\n[controller]\nlaw = 'energy-cycle'\n[safety]\n",
     "in a line": "controller = { law = 'energy-cycle', params = { window = 2 } } # c\n[safety]\nramp_s = 0.1\n",
@@ -38,6 +40,7 @@ LAYOUTS = {
 LAWS: list[tuple[str, dict[str, Any]]] = [
     ("energy-cycle", {}),
     ("energy-cycle", {"window": 1, "cap_share": 0.5, "rule": "signed"}),
+    ("ring-damping", {"pull_after": 0}),
     ("tdpa", {"damping_cap_n_s_per_m": 20, "reset": "never"}),
     ("none", {}),
 ]
@@ -58,19 +61,20 @@ def comments(text: str) -> list[str]:
 def test_in_every_layout_the_law_changes_and_nothing_else(layout: str, law: str, params: dict[str, Any]) -> None:
     text = LAYOUTS[layout]
     before, after = plain(text), plain(edited := with_law(text, "lab.toml", law, params))
-    kept = before["controller"]["params"] if law == "energy-cycle" else {}
+    was = before["controller"].get("law", DEFAULT)
+    kept = before["controller"]["params"] if law == was else {}
     assert after.pop("controller") == {"law": law, "params": {**kept, **params}}
     before.pop("controller")
     assert after == before
-    of_keys_that_left = 1 if law != "energy-cycle" else 0
+    of_keys_that_left = 1 if law != was else 0
     assert len([comment for comment in comments(text) if comment not in edited]) <= of_keys_that_left
     assert edited.startswith("\ufeff") == text.startswith("\ufeff")
     assert edited.endswith("\n")
 
 
 def test_a_new_parameter_stands_with_its_like_and_not_below_the_comment_that_heads_the_next_table() -> None:
-    edited = with_law(LAYOUTS["parameters only"], "lab.toml", "energy-cycle", {"cap_share": 0.5})
-    assert "window = 2 # w\ncap_share = 0.5\n\n# limits\n[safety]\n" in edited
+    edited = with_law(LAYOUTS["parameters only"], "lab.toml", "ring-damping", {"pull_after": 1})
+    assert "brake_ratio = 0.5 # w\npull_after = 1\n\n# limits\n[safety]\n" in edited
 
 
 def test_what_the_law_before_was_set_to_stays_behind_as_one_comment_a_law() -> None:
@@ -85,8 +89,9 @@ def test_what_the_law_before_was_set_to_stays_behind_as_one_comment_a_law() -> N
 
 
 def test_there_and_back_again_is_the_same_file() -> None:
-    there = with_law(REFERENCE.replace("window = 2 ", "# window = 2 "), "lab.toml", "none", {})
-    assert with_law(there, "lab.toml", "energy-cycle", {}) == REFERENCE.replace("window = 2 ", "# window = 2 ")
+    bare = REFERENCE.replace("brake_ratio = 0.6 ", "# brake_ratio = 0.6 ")
+    there = with_law(bare, "lab.toml", "none", {})
+    assert with_law(there, "lab.toml", "ring-damping", {}) == bare
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def test_a_law_of_ones_own_is_named_by_its_module(monkeypatch: pytest.MonkeyPatc
     vars(own).update(Params=law.Params, State=law.State, start=law.start, step=law.step)
     monkeypatch.setitem(sys.modules, "mylab", ModuleType("mylab"))
     monkeypatch.setitem(sys.modules, "mylab.laws", own)
-    assert parse("[controller]\nlaw = 'mylab.laws'\nparams = { window = 3 }", "x").law is own
+    assert parse("[controller]\nlaw = 'mylab.laws'\nparams = { pull_after = 3 }", "x").law is own
 
 
 def test_a_plugin_that_declares_a_table_inside_an_array_gets_tuples() -> None:

@@ -121,8 +121,8 @@ EXAMPLES = {
         'device.options.hand.force.newtons = 1: unknown key; did you mean "newton"?'
     ),
     "[device.options.hand]\nforce = { newton = 1 }": "device.options.hand.force.profile: this key is required",
-    "[controller.params]\nwindw = 3": 'controller.params.windw = 3: unknown key; did you mean "window"?',
-    "[controller.params]\nwindow = 0": "controller.params.window = 0: must be from 1 to 100",
+    "[controller.params]\npull_afte = 1": 'controller.params.pull_afte = 1: unknown key; did you mean "pull_after"?',
+    "[controller.params]\nbrake_ratio = 3": "controller.params.brake_ratio = 3: must be from 0 to 2",
     # TOML itself
     "[loop]\nrate_hz = = 3": "line 2, column 11: not TOML: invalid value",
     "[loop": "line 1, column 6: not TOML: expected ']' at the end of a table declaration",

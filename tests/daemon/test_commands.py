@@ -98,7 +98,7 @@ def test_an_edited_law_takes_over_without_a_step(daemon: Daemon) -> None:
     with heard(daemon) as subscriber:
         assert edit(daemon, PRESSED + '[controller]\nlaw = "mylab.soft"\n').returncode == 0
         event = subscriber.until("hapticd/event", code=EventCode.SWITCHED)
-        assert (event["law_before"], event["law"]) == ("energy-cycle", "mylab.soft")
+        assert (event["law_before"], event["law"]) == ("ring-damping", "mylab.soft")
         assert_ramped(daemon, event["seq"])
 
 

@@ -110,7 +110,7 @@ def test_from_another_computer_a_listed_key_watches_and_commands_and_nobody_else
         assert local.until("hapticd/status", armed=True)
 
         seen = remote.watch("--keys", "laptop.key_secret")
-        assert json.loads(seen.stdout)["law"] == "energy-cycle", seen.stderr
+        assert json.loads(seen.stdout)["law"] == "ring-damping", seen.stderr
         assert remote.watch("--keys", "wall.key_secret").returncode == 0
         for keys, why in (
             ((), "takes keys"),

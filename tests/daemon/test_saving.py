@@ -198,7 +198,7 @@ def test_a_daemon_takes_over_what_is_saved_for_as_long_as_the_file_says_so() -> 
 
         renamed_over(daemon.config, PRESSED + on + NEW)
         switched = subscriber.until("hapticd/event", code=EventCode.SWITCHED)
-        assert (switched["law_before"], switched["law"]) == ("energy-cycle", "tdpa")
+        assert (switched["law_before"], switched["law"]) == ("ring-damping", "tdpa")
 
         in_place(daemon.config, PRESSED + NEW)  # takes itself over, and then no more
         assert subscriber.until("hapticd/event", code=EventCode.SWITCHED)["law"] == "tdpa"

@@ -34,7 +34,7 @@ def test_the_daemon_is_asked_which_file_it_runs_and_takes_the_edit_over(daemon: 
         assert (done.returncode, done.stderr) == (0, "")
         assert "has taken it over" in done.stdout
         event = subscriber.until("hapticd/event", code=EventCode.SWITCHED)
-    assert (event["law_before"], event["law"]) == ("energy-cycle", "tdpa")
+    assert (event["law_before"], event["law"]) == ("ring-damping", "tdpa")
     assert daemon.config.read_text().startswith(PRESSED.rstrip())
     with Subscriber(daemon.endpoint, "hapticd/status") as subscriber:
         assert subscriber.until("hapticd/status", law="tdpa")["config_file"] == str(daemon.config)

@@ -71,7 +71,7 @@ def test_a_law_that_imports_for_ten_seconds_is_waited_for_and_the_watchdog_fed(d
             with contextlib.suppress(RefusedError):
                 command("disarm", timeout_s=PATIENCE_S)
             if len(fed_s) == 3:
-                assert command("status")["status"]["law"] == "energy-cycle"
+                assert command("status")["status"]["law"] == "ring-damping"
         assert asking.returncode == 0, asking.stderr.read() if asking.stderr else ""
     assert command("status")["status"]["law"] == "mylab.slow"
     pauses_s = [after - before for before, after in itertools.pairwise(fed_s)]
@@ -171,7 +171,7 @@ def test_a_configuration_may_have_any_name_that_a_file_may_have(
             command("reload", wait=True)
             assert command("status")["status"]["config_file"] == config
             with Subscriber(f"ipc://{tmp_path}/run/default/telemetry", "hapticd/status") as subscriber:
-                assert subscriber.until("hapticd/status", law="energy-cycle")["config_file"].endswith("b.toml")
+                assert subscriber.until("hapticd/status", law="ring-damping")["config_file"].endswith("b.toml")
             command("stop")
             assert running.wait(PATIENCE_S) == 0
         finally:

@@ -34,7 +34,7 @@ def test_from_one_command_to_a_live_view_and_back(tmp_path: Path) -> None:
     text = CONFIG.read_text().replace('tcp = "tcp://127.0.0.1:9872"', "")
     with watched(tmp_path, text) as terminal:
         terminal.until("ARMED")
-        terminal.until("energy-cycle")
+        terminal.until("ring-damping")
         terminal.type(b"q")
         terminal.until("stopped")
         assert terminal.process.wait(PATIENCE_S) == 0

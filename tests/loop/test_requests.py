@@ -74,7 +74,7 @@ def test_tare_is_refused_with_a_force_or_without_a_position_and_moves_nothing(
 def test_a_tared_scene_is_kept_through_a_switch_and_felt_where_it_is(bench: Bench) -> None:
     bench.ticks(1)
     bench.ask(do="tare")
-    wanted = configured(WALLS.replace("12000.0", "9000.0"))
+    wanted = configured(WALLS.replace("12000.0", "9000.0") + "[controller]\nlaw = 'none'\n")
     assert bench.ask(**switch_request(START, wanted)) == ""
     assert bench.tick.motion.origin_m == pytest.approx([0.02])
     assert bench.ask(do="arm") == ""
@@ -112,9 +112,9 @@ def test_a_switch_that_is_refused_leaves_law_scene_and_limits_as_they_were(bench
 def test_what_means_the_same_goes_on_with_what_the_law_has_learnt(bench: Bench) -> None:
     """A default that is now written out is no other law."""
     law = bench.tick.contacts[0].law
-    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nwindow = 2\n"))) == ""
+    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nbrake_ratio = 0.6\n"))) == ""
     assert bench.tick.contacts[0].law is law
-    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nwindow = 3\n"))) == ""
+    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nbrake_ratio = 0.5\n"))) == ""
     assert bench.tick.contacts[0].law is not law
 
 
@@ -231,5 +231,5 @@ def test_while_a_law_is_imported_the_interpreter_comes_back_sooner(
 def test_a_law_that_cannot_be_imported_is_an_answer(bench: Bench) -> None:
     request = switch_request(START, configured(WALLS)) | {"law": "tests.no_such_law", "keep_law": False}
     assert "tests.no_such_law" in bench.ask(**request)
-    assert bench.tick.contacts[0].law.module.__name__ == "hapticd_controllers.energy_cycle"
+    assert bench.tick.contacts[0].law.module.__name__ == "hapticd_controllers.ring_damping"
     assert bench.ask(do="arm") == ""

@@ -31,6 +31,8 @@ hand = {{ force = {{ profile = "constant", newton = -3.0 }}, stiffness_n_per_m =
 {accuracy}
 [[scene.walls]]
 stiffness_n_per_m = 2000.0
+[controller]
+law = "energy-cycle"
 """
 
 
@@ -132,6 +134,8 @@ def test_another_integrator_is_taken_where_friction_makes_the_exact_step_dear() 
         stiffness_n_per_m = 100.0
         [[scene.walls]]
         stiffness_n_per_m = 2000.0
+        [controller]
+        law = "energy-cycle"
         """
     found = fit(parse(text, "lab.toml"))
     assert found is not None

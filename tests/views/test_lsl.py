@@ -133,7 +133,7 @@ def test_channels_have_names_and_units(streamed: dict[str, Any]) -> None:
     assert len(streamed["ticks"][1][0]) == len(channels) == int(info.findtext("channel_count") or 0)
     assert float(info.findtext("nominal_srate") or 0) == 1000.0
     assert info.findtext("desc/hapticd/device")
-    assert info.findtext("desc/hapticd/law") == "energy-cycle"
+    assert info.findtext("desc/hapticd/law") == "ring-damping"
 
 
 def test_markers_cycles_and_events_are_texts_in_between(streamed: dict[str, Any]) -> None:
