@@ -23,7 +23,7 @@ from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.boundaries import Loop, stable_limit
 from hapticd_studies.law_spec import LawSpec, parse_laws
 from hapticd_studies.transparency import references, scores
-from hapticd_studies.transparency.devices import Held, draw
+from hapticd_studies.transparency.devices import PARTS, Held, draw, draw_out_of_sample
 from hapticd_studies.transparency.hands import HOLD, IN, KINDS, LET_GO_S, OUT, movement
 from hapticd_studies.transparency.references import calm, least_damping
 from hapticd_studies.transparency.runs import COLUMNS, columns_of, moving_runs, rows, times_of
@@ -85,6 +85,31 @@ def test_a_device_and_its_hand_depend_on_seed_and_index_alone() -> None:
     assert draw(1, 58) == DEVICES[58]
     assert draw(1, 58).movement(10.0) == before
     assert draw(2, 58) != DEVICES[58]
+
+
+def test_out_of_sample_one_in_three_is_late_one_flexible_and_one_both() -> None:
+    drawn = [draw_out_of_sample(1, index) for index in range(30)]
+    for one in drawn:
+        before, options, late = draw(1, one.index), one.options, one.options.force_delay_s / one.period_s
+        assert (options.flexible is None) == (one.part == "fraction")
+        assert (late > 0.0) == (one.part != "flexible")
+        assert late <= 2.0
+        assert options.bandwidth_hz == 0.0
+        assert (options.mass_kg, options.hand, one.rate_hz) == (
+            before.options.mass_kg,
+            before.options.hand,
+            before.rate_hz,
+        )
+        assert 0.19 < one.own_share < 5.01
+    assert [one.part for one in drawn[:3]] == list(PARTS)
+    assert any(one.options.flexible and one.options.flexible.sensor == "handle" for one in drawn)
+
+
+def test_the_configuration_of_a_device_out_of_sample_has_all_that_it_has() -> None:
+    for index in range(3):
+        held = draw_out_of_sample(1, index)
+        options = parse(held.config("none", 1.0), "device.toml").options
+        assert options.model_dump() == held.moved(1.0).model_dump()
 
 
 @pytest.mark.parametrize("kind", KINDS)

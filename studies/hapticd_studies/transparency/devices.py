@@ -37,7 +37,7 @@ OUT_OF_SAMPLE = (
     "any part of one, in place of whole samples; one in three flexible: 60-500 Hz with both ends free, 10-50 % of the "
     "mass behind the spring, damping ratio 0.5-5 %, one in four with its sensor at the handle; one in three both"
 )
-PARTS = ("late", "flexible", "both")
+PARTS = ("fraction", "flexible", "both")
 """What devices out of sample have that the others have not, in turn."""
 
 
@@ -232,7 +232,7 @@ def draw_out_of_sample(seed: int, index: int) -> Held:
     more: dict[str, Any] = {"bandwidth_hz": 0.0}
     if part != "flexible":
         more |= {"force_delay_samples": 0, "force_delay_s": _digits(late * before.period_s)}
-    if part != "late":
+    if part != "fraction":
         flexible = {"frequency_hz": hertz, "handle_share": _digits(share), "damping_ratio": ratio, "sensor": sensor}
         more["flexible"] = flexible
     options = SimulationOptions.model_validate({**before.options.model_dump(exclude_unset=True), **more})
