@@ -67,3 +67,14 @@ def test_a_lead_of_one_sample_is_enough_only_because_the_force_is_a_sample_old()
     for lead_s, still in ((0.001, False), (0.003, True)):
         params = damper.Params(damping_n_s_per_m=lead_s * SHOWN * 20e3)
         assert all(rest.still is still for rest in rests(damper, solved, params, machine.drive))
+
+
+def test_a_second_touch_is_as_the_first_and_a_start_knows_of_no_force() -> None:
+    state, params = fresh_state(input_to_state), Params()
+    input_to_state.start(state, params, LawSnapshot(-1e-3, 0.0, 5.0))
+    touch = LawTick(x_m=-1e-3, moved_m=-2e-3, velocity_m_per_s=-0.2, in_contact=True, contact_n=12.0, spring_n=12.0)
+    first_n = input_to_state.step(state, params, touch)
+    assert state.environment_n == pytest.approx(12.0)
+    assert input_to_state.step(state, params, LawTick(x_m=1e-3, moved_m=2e-3)) == 0.0
+    assert input_to_state.step(state, params, touch) == first_n
+    assert state.environment_n == pytest.approx(12.0)
