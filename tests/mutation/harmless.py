@@ -27,6 +27,7 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "controllers/hapticd_controllers/set_position.py: step: if budget_j >= asked_j:  [GtE 0 is Gt]",
         "controllers/hapticd_controllers/tdpa.py: step: if params.reset == RESET_CONTACT and state.energy_j > 0.0:  "
         "[Gt 0 is GtE]",
+        "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 0 is Lt]",
         "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 1 is Lt]",
     ),
     "a longer frame is no intact message either, and less than a microsecond is none": (
@@ -86,6 +87,7 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/supervisor/recovery.py: Recovery.__init__: def __init__  [without self.lost_s = 0.0]",
         "hapticd/supervisor/recovery.py: Recovery.__init__: def __init__  [without self._arrivals = HotplugWatch()]",
         "hapticd/tick/contact.py: Contact.__init__: self.force_n = 0.0  [0.0 is 1.0]",
+        "hapticd/tick/velocity.py: _History.__init__: self.position_m = [0.0] * self.size  [0.0 is 1.0]",
         "hapticd/tick/velocity.py: LowPass.__init__: def __init__  [without self._weight = 0.0]",
     ),
 }
