@@ -10,6 +10,7 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/tick/guard.py: Guard.reduce: if newton > max_axis_n or newton < -max_axis_n:  [Gt 0 is GtE]",
         "hapticd/tick/guard.py: Guard.reduce: if newton > max_axis_n or newton < -max_axis_n:  [Lt 0 is LtE]",
         "controllers/hapticd_controllers/input_to_state.py: step: if contact_m < 0.0:  [Lt 0 is LtE]",
+        "hapticd/tick/scene.py: Wall.stored_j: if x_m >= 0.0:  [GtE 0 is Gt]",
         "controllers/hapticd_controllers/virtual_coupling.py: step: if proxy_m < 0.0:  [Lt 0 is LtE]",
         "hapticd/tick/guard.py: blended: if weight >= 1.0:  [GtE 0 is Gt]",
         "hapticd/tick/guard.py: blended: weight: float = done / state.blend_ticks if done > 0.0 else 0.0  "
@@ -72,6 +73,12 @@ EQUAL: dict[str, tuple[str, ...]] = {
     ),
     "it is placed once more, where it has just been placed": (
         "hapticd/tick/space/solid_contact.py: SolidContact._stand: def _stand  [without self._away = False]",
+    ),
+    "whatever is large enough to be no number of a contact will do": (
+        "controllers/hapticd_controllers/energy_bounding.py: : LIMIT = 1000000000000.0  [1000000000000.0 is "
+        "2000000000000.0]",
+        "controllers/hapticd_controllers/virtual_coupling.py: : LIMIT = 1000000000000.0  [1000000000000.0 is "
+        "2000000000000.0]",
     ),
     "whatever is small enough to be no length will do": (
         "hapticd/tick/space/channel.py: slip_along: if -LEAST_M < x_m < LEAST_M:  [Lt 1 is LtE]",

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import Phase, settings
 
 SHORTEST_LIMIT_S = 20.0
-"""Shortest time limit of one test [s]; one that takes longer than twenty times what it takes without a slip fails."""
+"""Shortest time limit of one test [s]; else twenty times what it takes without a slip, and five times its file: the
+first of its tests to run may have to compile what another one had compiled before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +41,17 @@ class Experience:
 
     def order(self) -> list[str]:
         """The tests: first those that notice most in the shortest time, then file by file, the quickest first."""
-        files: defaultdict[str, float] = defaultdict(float)
-        for name, took_s in self.took_s.items():
-            files[_file(name)] += took_s
+        files = self.files_s()
         noticing = sorted(self.noticed, key=lambda name: -self.noticed[name] / (0.05 + self.took_s.get(name, 0.0)))
         others = sorted(self.took_s, key=lambda name: (files[_file(name)], _file(name), self.took_s[name]))
         return [*noticing, *(name for name in others if name not in self.noticed)]
+
+    def files_s(self) -> dict[str, float]:
+        """How long the tests of each file take [s]."""
+        files: defaultdict[str, float] = defaultdict(float)
+        for name, took_s in self.took_s.items():
+            files[_file(name)] += took_s
+        return files
 
 
 class InOrder:
@@ -60,7 +66,11 @@ class InOrder:
 
     def __init__(self, experience: Experience, to: Connection) -> None:
         self._place = {name: place for place, name in enumerate(experience.order())}
-        self._took_s = experience.took_s
+        files = experience.files_s()
+        self._limits_s = {
+            name: max(SHORTEST_LIMIT_S, 20.0 * took_s + 5.0 * files[_file(name)])
+            for name, took_s in experience.took_s.items()
+        }
         self._to = to
         self._told = Told({}, [])
 
@@ -76,9 +86,8 @@ class InOrder:
         """In order; what is not known stays at the end, as it is."""
         items.sort(key=lambda item: self._place.get(item.nodeid, len(self._place)))
         for item in items:
-            if item.nodeid in self._took_s:
-                limit_s = max(SHORTEST_LIMIT_S, 20.0 * self._took_s[item.nodeid])
-                item.add_marker(pytest.mark.timeout(limit_s), append=False)
+            if item.nodeid in self._limits_s:
+                item.add_marker(pytest.mark.timeout(self._limits_s[item.nodeid]), append=False)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """What a test, its setting up and its clearing away took."""
