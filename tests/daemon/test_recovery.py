@@ -188,3 +188,27 @@ def test_what_comes_is_news_once_and_what_goes_is_none(monkeypatch: pytest.Monke
     (tmp_path / "usb" / "other").touch()
     clock.now_s += 0.3
     assert watch.news()
+
+
+def test_the_loop_that_has_the_device_is_handed_over_and_nothing_is_looked_for_any_more(
+    looking: tuple[Recovery, list[UnderWay]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, tries = looking
+    assert made.lost
+    found: Any = SimpleNamespace()
+    monkeypatch.setattr(tries[0], "poll", lambda: found)
+    assert made.turn(LOST, NO_CONFIG) is found
+    assert not made.lost
+
+
+def test_what_was_plugged_in_before_the_device_was_lost_is_no_news(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(recovery, "PLACES", (tmp_path,))
+    monkeypatch.setattr(recovery, "LoopStart", UnderWay)
+    made = Recovery()
+    (tmp_path / "another").touch()
+    made.begin(LOST, "unplugged")
+    due_s = made.next_try_s
+    made.turn(LOST, NO_CONFIG)
+    assert made.next_try_s == due_s

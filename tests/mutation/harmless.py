@@ -87,6 +87,8 @@ EQUAL: dict[str, tuple[str, ...]] = {
     "it is set before it is read": (
         "hapticd/tick/space/channel.py: Channel.__init__: def __init__  [without self.dz = 1.0]",
         "hapticd/tick/contact.py: Contact.__init__: def __init__  [without self.x_m = 0.0]",
+        "hapticd/tick/space/solid_contact.py: SolidContact.__init__: self.quiet = True  [True is False]",
+        "hapticd/supervisor/recovery.py: Recovery.__init__: self.lost_s = 0.0  [0.0 is 1.0]",
         "hapticd/tick/guard.py: Guard.__init__: def __init__  [without self._ramp_s = safety.ramp_s]",
         "hapticd/tick/tick.py: ControlTick.__init__: def __init__  [without self._excused = False]",
         "hapticd/tick/energy.py: EnergyLedger.__init__: self.window_minimum_j = 0.0  [0.0 is 1.0]",

@@ -50,6 +50,19 @@ def test_the_forces_of_all_directions_add_up_to_the_spring_between_device_and_pr
     assert apart(rig.force, spring) < 1e-9
     assert apart(rig.force, (0.0, 0.0, 0.0)) > 3.0
     assert rig.tick.requested_n == pytest.approx(rig.force)
+    assert rig.totals.friction_stored_j == pytest.approx(0.5 * 5000.0 * length(stretch) ** 2, rel=1e-9)
+
+
+def test_a_device_that_went_round_an_object_out_of_its_reach_is_pushed_out_on_the_other_side() -> None:
+    rig = pressed(ball()).to(ABOVE, 20)
+    rig.go((0.0, 0.0, 0.3), (0.3, 0.0, 0.0), (0.0, 0.0, -0.3), (0.0, 0.0, -0.0305))
+    rig.to((0.0, 0.0, -0.0295), 20)
+    assert rig.force == pytest.approx((0.0, 0.0, -2.5), abs=1e-6)
+
+
+def test_a_law_that_takes_over_on_an_object_knows_how_fast_the_device_is() -> None:
+    rig = pressed(ball()).to((0.0, 0.0, 0.0290), 4)  # 50 mm/s inwards
+    assert rig.tick.solids[0].normal.snapshot().velocity_m_per_s == pytest.approx(-0.05, rel=1e-6)
 
 
 CHANNELS = [Channel(RunningLaw(none, none.Params()), 0.0, EnergyLedger()) for _ in range(3)]
