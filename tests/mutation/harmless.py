@@ -80,6 +80,10 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "controllers/hapticd_controllers/virtual_coupling.py: : LIMIT = 1000000000000.0  [1000000000000.0 is "
         "2000000000000.0]",
     ),
+    "only what is larger than any bound comes so far": (
+        "controllers/hapticd_controllers/tdpa.py: _bounded: return LIMIT if value > 0.0 else -LIMIT  [0.0 is 1.0]",
+        "controllers/hapticd_controllers/tdpa.py: _bounded: return LIMIT if value > 0.0 else -LIMIT  [Gt 0 is GtE]",
+    ),
     "whatever is small enough to be no length will do": (
         "hapticd/tick/space/channel.py: slip_along: if -LEAST_M < x_m < LEAST_M:  [Lt 1 is LtE]",
         "hapticd/tick/space/channel.py: : LEAST_M = 1e-15  [1e-15 is 2e-15]",
