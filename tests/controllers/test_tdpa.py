@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import pytest
 
-from hapticd.law import LawSnapshot
+from hapticd.law import LawSnapshot, LawTick, fresh_state
 from hapticd_controllers import energy_cycle, none, tdpa
 from hapticd_controllers.tdpa import Params, step
 
@@ -199,3 +199,12 @@ def test_told_of_the_delay_both_hold_most_starts_at_20_kn_per_m_and_the_plain_on
     late = Device(stiffness_n_per_m=20e3, delay_samples=1)
     assert all(rest.held for rest in rests(aware, late, Params(), machine.drive))
     assert 11 <= sum(rest.held for rest in rests(aware, late, REFERENCE, machine.drive)) < 21
+
+
+@pytest.mark.parametrize(("cap_n_s_per_m", "injected_n_s_per_m"), [(0.5, 0.5), (20.0, 20.0), (0.0, 1e5)])
+def test_the_cap_is_the_most_that_is_injected_and_0_is_none(cap_n_s_per_m: float, injected_n_s_per_m: float) -> None:
+    """A debt of 1 J at 0.1 m/s: 1e5 N s/m would pay it in a tick."""
+    state, params = fresh_state(tdpa), Params(damping_cap_n_s_per_m=cap_n_s_per_m)
+    tdpa.start(state, params, LawSnapshot(debt_j=1.0))
+    step(state, params, LawTick(x_m=-1e-3, velocity_m_per_s=0.1, in_contact=True, contact_n=10.0, spring_n=10.0))
+    assert state.damping_n_s_per_m == pytest.approx(injected_n_s_per_m)
