@@ -207,4 +207,4 @@ def test_the_cap_is_the_most_that_is_injected_and_0_is_none(cap_n_s_per_m: float
     state, params = fresh_state(tdpa), Params(damping_cap_n_s_per_m=cap_n_s_per_m)
     tdpa.start(state, params, LawSnapshot(debt_j=1.0))
     step(state, params, LawTick(x_m=-1e-3, velocity_m_per_s=0.1, in_contact=True, contact_n=10.0, spring_n=10.0))
-    assert state.damping_n_s_per_m == pytest.approx(injected_n_s_per_m)
+    assert state.damping_n_s_per_m == pytest.approx(injected_n_s_per_m, rel=0.01)
