@@ -60,7 +60,10 @@ class StreamedForce(OnePort):
         if not update.said & FORCE:
             return False
         most = self.limits.max_force_n
-        goal_n = [min(max(newton, -most), most) for newton in update.force_n[: len(self._goal_n)]]
+        goal_n = update.force_n[: len(self._goal_n)]
+        largest_n = max(map(abs, goal_n))
+        if largest_n > most:  # first, so that no square is too large
+            goal_n = [newton / largest_n * most for newton in goal_n]
         length = sqrt(sum([newton * newton for newton in goal_n]))
         if length > most:
             goal_n = [newton * (most / length) for newton in goal_n]
