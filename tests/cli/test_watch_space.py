@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from hapticd.cli.watch.screen import frame, one_line
@@ -75,3 +77,18 @@ def test_a_direction_is_told_by_its_largest_parts() -> None:
     assert direction((0.0, 0.0, 3.0)) == "+z"
     assert direction((-1.0, 0.1, 2.0)) == "+z-x"
     assert direction((0.0, 0.0, 0.0)) == ""
+
+
+def test_couplings_and_forces_stand_behind_walls_and_objects_under_their_names() -> None:
+    known = touched()
+    kinds = ("object", "coupling", "force")
+    known.take([dataclasses.replace(STATUS, remote_name=("ball", "tool", "field"), remote_kind=kinds)], 0.0)
+    values = (7.5, 20.5, 0.0, 3.5, 0.0)
+    known.take([Damping(1.0, 99, values, (False, True, False, True, False), (0.0,) * 5)], 0.0)
+    text = "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+    assert text.count("wall 0") == 1
+    assert "wall 1" not in text
+    assert "client's tool  ● held     damping    3.5 N s/m" in text
+    assert "client's field  ○ let go   damping    0.0 N s/m" in text
+    assert "damping 20.5 N s/m  sliding" in text
+    assert "tool held damping 3.5 N s/m" in one_line(known)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
+from hapticd.cli.watch.contacts import count_walls, of_objects, of_ports
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, bars, plot
 from hapticd.cli.watch.space import VIEW_ROWS, contact_lines, views
 from hapticd.cli.watch.state import ScreenState
@@ -82,10 +83,14 @@ def one_line(known: ScreenState) -> str:
             )
         ]
     if known.damping:
-        walls = len(known.damping.damping_n_s_per_m) - len(status.object_name)
+        walls = count_walls(known.damping, status)
         parts += [f"damping {damping:.1f} N s/m" for damping in known.damping.damping_n_s_per_m[:walls]]
+        parts += [
+            f"{name} {'held' if held else 'let go'} damping {damping:.1f} N s/m"
+            for name, held, damping in of_ports(known.damping, status)
+        ]
     if status.object_name:
-        parts += [line.plain.strip() for line in contact_lines(known.trail, status, _of_objects(known, status))]
+        parts += [line.plain.strip() for line in contact_lines(known.trail, status, of_objects(known.damping, status))]
     if known.energy:
         parts += [f"energy {si(known.energy.energy_j, 'J')}", f"generated {si(known.energy.generated_j, 'J')}"]
     return "  ".join(parts)
@@ -106,7 +111,7 @@ def _running(known: ScreenState, status: Status, endpoint: str, width: int, heig
     above += _model(status, width)
     middle = [
         *_walls(known, status, width),
-        *contact_lines(known.trail, status, _of_objects(known, status)),
+        *contact_lines(known.trail, status, of_objects(known.damping, status)),
         _energy(known, width),
     ]
     footer = _footer(status, endpoint, width)
@@ -279,12 +284,12 @@ def _coloured(titles: Sequence[str], unit: str) -> Text:
 
 def _walls(known: ScreenState, status: Status, width: int) -> list[Text]:
     damping = known.damping
-    if damping is not None and status.object_name and len(damping.damping_n_s_per_m) == len(status.object_name):
+    if damping is None:
         return []
-    if damping is None or not damping.damping_n_s_per_m:
-        return [Text(" no walls in the scene", style=_QUIET)] if damping else []
+    if not damping.damping_n_s_per_m:
+        return [Text(" no walls in the scene", style=_QUIET)]
     lines = []
-    count = len(damping.damping_n_s_per_m) - len(status.object_name)
+    count = count_walls(known.damping, status)
     for index in range(min(count, _MOST_WALLS)):
         line = _quiet(" wall ").append(f"{index}", "bold")
         if index < len(status.wall_axis):
@@ -303,12 +308,11 @@ def _walls(known: ScreenState, status: Status, width: int) -> list[Text]:
         lines.append(line)
     if count > _MOST_WALLS:
         lines[-1] = _spread(lines[-1], Text(f"+{count - _MOST_WALLS} walls ", style=_QUIET), width)
+    for name, held, value in of_ports(known.damping, status)[:_MOST_WALLS]:
+        line = _quiet(" client's ").append(name, "bold")
+        line.append("  ● held   " if held else "  ○ let go ", "bold cyan" if held else _QUIET)
+        lines.append(line.append("  damping ", _QUIET).append(f"{value:6.1f}", "bold").append(" N s/m"))
     return lines
-
-
-def _of_objects(known: ScreenState, status: Status) -> Sequence[float]:
-    """Damping of the law on each object, which stand behind the walls [N s/m]."""
-    return known.damping.damping_n_s_per_m[-len(status.object_name) :] if known.damping else ()
 
 
 def _energy(known: ScreenState, width: int) -> Text:
