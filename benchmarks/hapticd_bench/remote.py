@@ -15,7 +15,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,9 @@ from hapticd_bench.running import running_daemon
 PERIOD_US = 1000.0
 MOST_TIMES = 3.0
 """What a way may take, in ways of the echo."""
+
+MOST_OTHERS = 0.5
+"""Processors that other programs may keep busy: beyond it a program at normal priority waits for them."""
 
 STEP_S = 0.02
 """What a message takes, about: it, its echo and the pauses between them [s]."""
@@ -141,6 +144,9 @@ def _report(
             _bar(f"tick to client, {name} [us]", getattr(to_client, name), MOST_TIMES * getattr(echo, name)),
         )
     ]
+    if machine.others > MOST_OTHERS:
+        note = f"other programs kept {machine.others:.2f} processors busy"
+        bars = [replace(bar, verdict="INCONCLUSIVE", note=note) for bar in bars]
     return RemoteReport(echo, to_tick, to_client, tuple(doubtful(bars, machine)), machine)
 
 
@@ -155,7 +161,7 @@ class _Driver:
         self._context = zmq.Context()
         self._scene = self._context.socket(zmq.DEALER)
         self._state = self._context.socket(zmq.SUB)
-        self._state.setsockopt(zmq.CONFLATE, 1)
+        self._state.setsockopt(zmq.RCVHWM, 0)  # every tick: the first that goes by a message is looked for
         self._state.setsockopt(zmq.SUBSCRIBE, b"")
         self._scene.connect(f"ipc://{directory}/scene")
         self._state.connect(f"ipc://{directory}/state")
@@ -183,7 +189,8 @@ class _Driver:
             When it was sent [ns], the first tick that went by it, and when each tick was heard that was waited for
             [ns].
         """
-        self.hear()  # what waited; the next ones are waited for
+        while self._state.poll(0):  # what waited; the next ones are waited for
+            self._state.recv()
         self._seq += 1
         message = {"name": "tool", "seq": self._seq, "position_m": [0.001 if self._seq % 2 else 0.0]}
         sent_ns = time.monotonic_ns()

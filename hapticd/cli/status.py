@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import typer
@@ -71,8 +71,17 @@ def _lines(one: Mapping[str, Any]) -> list[str]:
     lines = [f"{one['name']}: {', '.join(parts)}"]
     if status["fault_code"]:
         lines.append(f"  fault {status['fault_code']} at {_shown(status['fault_timestamp'])}: {status['fault_text']}")
+    lines.extend(_driven(status))
     lines.extend(f"  {warning}" for warning in status["warnings"])
     return lines
+
+
+def _driven(status: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each thing that clients may drive."""
+    counted = ("remote_name", "remote_kind", "remote_owner", "remote_messages", "remote_refused")
+    for name, kind, owner, messages, refused in zip(*(status.get(key, ()) for key in counted), strict=True):
+        whose = f"driven by {owner}" if owner else "no client"
+        yield f"  {kind} {name}: {whose}, {messages} messages, {refused} refused"
 
 
 def _shown(timestamp: float) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ from hapticd.client.commands import RefusedConfigError
 from hapticd.keys.file import Key, new_pair, write
 from hapticd.keys.store import KeyDirectory
 from hapticd.tick.event import EventCode
-from tests.daemon.running import Daemon, Subscriber, gone, wait_until
+from tests.daemon.running import HAPTICD, Daemon, Subscriber, gone, wait_until
 from tests.remote.stage import CONFIG, driven, hold, remote_pid, runtime
 
 NOTHING_TO_DRIVE = CONFIG[: CONFIG.index("[[scene.couplings]]")]
@@ -44,6 +46,11 @@ def test_it_comes_and_goes_with_what_clients_may_drive_and_keeps_their_names(mon
                     sent = field.seq
                     wait_until(lambda: field.state().ports["field"].seq == sent, "the force to be felt")
                 assert client.status().remote_name == ("tool", "field")
+                shown = subprocess.run([HAPTICD, "status"], capture_output=True, text=True, check=True).stdout
+                assert re.search(
+                    r"^  coupling tool: driven by user \d+, process \d+, \d+ messages, 0 refused$", shown, re.M
+                )
+                assert re.search(r"^  force field: (driven by .+|no client), \d+ messages, 0 refused$", shown, re.M)
             assert remote_pid(daemon) == first
 
             daemon.config.write_text(CONFIG + "[remote]\nlease_s = 2.0\n")
