@@ -50,6 +50,28 @@ def whole(record: TickRecord) -> bool:
     return len(record.walls) == number % (MAX_WALLS + 1) and {*scalars, *vectors, *wall_numbers} == {number}
 
 
+def test_a_reader_that_is_too_slow_costs_another_one_nothing(shared: SharedMemory) -> None:
+    slow, quick = RecordReader(shared), RecordReader(shared)
+    seen: list[int] = []
+    for _ in range(3 * shared.slots // 100):
+        write(shared, 100)
+        seen += [record.seq for record in quick.read()]
+    assert seen == list(range(3 * shared.slots))
+    assert quick.dropped == 0
+    late = [record.seq for record in slow.read()]
+    assert late[-1] == seen[-1]
+    assert len(late) + slow.dropped == len(seen)
+
+
+def test_a_reader_may_begin_with_what_comes_next(shared: SharedMemory) -> None:
+    write(shared, 30)
+    reader = RecordReader(shared, newest=True)
+    assert reader.read() == []
+    write(shared, 2)
+    assert [record.seq for record in reader.read()] == [30, 31]
+    assert reader.dropped == 0
+
+
 def test_records_come_out_as_they_went_in_and_once(shared: SharedMemory) -> None:
     reader = RecordReader(shared)
     write(shared, 30)
