@@ -9,7 +9,7 @@ from hapticd.config.remote import PortLimits
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.one_port import OnePort
-from hapticd.tick.remote.update import FORCE, Update
+from hapticd.tick.remote.update import FORCE, RELEASED, Update
 from hapticd.tick.space.channel import LEAST_M
 
 BLEND_S = 0.005
@@ -50,6 +50,12 @@ class StreamedForce(OnePort):
     def set_ramp(self, ramp_s: float) -> None:
         """Let go and come in within this time, and never more than `LET_GO_S`, from now on [s]."""
         super().set_ramp(min(ramp_s, LET_GO_S))
+
+    def take(self, update: Update) -> None:
+        """Take what the client has said; called between ticks."""
+        if update.said & RELEASED:  # what comes after it was chosen anew, the same or not
+            self._same_s = 0.0
+        super().take(update)
 
     def forget(self) -> None:
         """Know nothing of a client until it says something anew."""

@@ -1,0 +1,37 @@
+"""A force that stood too long, and what its client has to do to be believed again."""
+
+from __future__ import annotations
+
+from hapticd.tick.remote.port import PortState
+from tests.tick.remote.rig import FORCE_PORT, Rig, update
+
+
+def hung() -> Rig:
+    """A client that has sent the same force for longer than a second."""
+    rig = Rig(FORCE_PORT)
+    for _ in range(150):
+        rig.say("field", force_n=[1.0])
+        rig.go(ticks=10)
+    assert rig["field"].state is PortState.STALE
+    return rig
+
+
+def test_the_same_force_is_not_believed_again_and_another_one_is() -> None:
+    rig = hung()
+    states = []
+    for newton in (1.0, 1.1):
+        rig.say("field", force_n=[newton])
+        states.append(rig["field"].state)
+    assert states == [PortState.STALE, PortState.HELD]
+
+
+def test_after_letting_go_the_same_force_is_a_new_one() -> None:
+    """The next client may well want what the one before it wanted."""
+    rig = hung()
+    rig["field"].take(update(rig.seq + 1, released=True))
+    rig.go(ticks=100)
+    assert rig.force == [0.0]
+    for _ in range(10):
+        rig.say("field", force_n=[1.0])
+        rig.go(ticks=10)
+    assert rig.force == [1.0]
