@@ -26,7 +26,7 @@ SERVICE_EXTRAS := metrics,dashboard
 PLACE = $(DESTDIR)$(PREFIX)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint web nightly bench packages clean install uninstall own-place deb
+.PHONY: help run test lint web clients nightly bench packages clean install uninstall own-place deb
 
 help:
 	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
@@ -45,7 +45,7 @@ run: $(READY_RUN)
 
 # Most of the time is spent waiting for daemons that run in real time, so more workers than the two processors of CI; but
 # with four, real-time loops, their supervisors and compilers hold each other up too often.
-test: packages lint web
+test: packages lint web clients
 	$(BIN)/pytest --numprocesses 3 --dist loadfile --max-worker-restart 0
 
 lint: $(READY)
@@ -68,7 +68,16 @@ $(PAGE_VENDOR)/uPlot.esm.js: views/package.json views/package-lock.json
 	cp $(UPLOT)/dist/uPlot.esm.js $(PAGE_VENDOR)/
 	@touch $@
 
-nightly: packages web $(READY)
+# A program that others wrote for Haply's service, for the tests of hapticd gateway: 3 MB, of which they run one file.
+CLIENTS := $(VENV)/clients
+clients: $(CLIENTS)/.ready
+
+$(CLIENTS)/.ready: tests/views/gateway/isaaclab.txt | $(BIN)/python
+	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --require-hashes --only-binary :all: \
+		--python-version 3.11 --platform manylinux_2_35_x86_64 --dest $(CLIENTS) --requirement $<
+	@touch $@
+
+nightly: packages web clients $(READY)
 	$(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
 	REPEAT=50 $(BIN)/pytest tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views \

@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from hapticd.errors import ClientError
-from hapticd_views.dashboard.address import Address
+from hapticd_views.address import Address
 from hapticd_views.dashboard.server import Dashboard
 from hapticd_views.dashboard.target import Target
 

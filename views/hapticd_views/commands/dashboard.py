@@ -54,7 +54,7 @@ def dashboard(
         raise ClientError(f"--control {control}: name the same daemon's telemetry with --connect as well")
     import asyncio
 
-    from hapticd_views.dashboard.address import Address
+    from hapticd_views.address import Address
     from hapticd_views.dashboard.server import Dashboard
     from hapticd_views.dashboard.target import Target
 

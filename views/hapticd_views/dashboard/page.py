@@ -9,7 +9,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Response
 
 from hapticd.errors import ClientError
-from hapticd_views.dashboard.address import Address
+from hapticd_views.address import Address
 
 FOLDER = Path(__file__).parent / "page"
 

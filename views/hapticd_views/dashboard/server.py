@@ -17,7 +17,7 @@ from websockets.http11 import Request, Response
 
 from hapticd.errors import ClientError, HapticdError
 from hapticd.version import __version__
-from hapticd_views.dashboard.address import Address
+from hapticd_views.address import Address
 from hapticd_views.dashboard.editor import Editor
 from hapticd_views.dashboard.feed import Feed
 from hapticd_views.dashboard.history import KEEP_S
