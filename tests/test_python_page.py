@@ -1,6 +1,7 @@
 """docs/python.md does what it says: each section is run, from the wheel and outside the checkout, as its reader would.
 
-A section that connects to a daemon finds one, on the shipped configuration.
+A section that connects to a daemon finds one, on the shipped configuration or on one of its own that other programs
+drive.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ def follow(blocks: list[Block], installed: Path, folder: Path) -> subprocess.Com
     environment = {**os.environ, "PYTHONPATH": str(installed), "COLUMNS": "120", "MPLBACKEND": "agg"}
     with contextlib.ExitStack() as stack:
         if any("hapticd.connect(" in block.text for block in blocks):
-            daemon = Daemon((ROOT / "config" / "hapticd.toml").read_text(), pythonpath=installed)
+            driven = [block.text for block in blocks if "[[scene.couplings]]" in block.text]
+            config = driven[0] if driven else (ROOT / "config" / "hapticd.toml").read_text()
+            daemon = Daemon(config, pythonpath=installed)
             stack.enter_context(daemon).wait_ready()
             environment["HAPTICD_RUNTIME_DIR"] = str(daemon.directory / "run")
         return subprocess.run(
