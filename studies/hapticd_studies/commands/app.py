@@ -24,6 +24,10 @@ app = lazy_group(
             f"{_COMMANDS}.transparency:command",
             "Let hands move on random devices under every law, and score what they are given and what they feel.",
         ),
+        "targets": (
+            f"{_COMMANDS}.targets:command",
+            "Hold laws against what was asked of the default law, and show what its settings trade for each other.",
+        ),
         "accuracy": (
             f"{_COMMANDS}.accuracy:command",
             "Measure what every shortcut costs in accuracy, and what every bit of accuracy costs in time.",

@@ -1,0 +1,75 @@
+"""`hapticd study targets`: laws against what was asked of the default law, or what settings trade for each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from hapticd.errors import ConfigError
+from hapticd_studies.grid.output import require_cluster, require_extra, require_folder, write
+
+_TARGETS = ("targets.json",)
+_FRONT = ("front.json", "front.png")
+
+
+def command(
+    laws: Annotated[str, typer.Option(help="Some laws, as ring-damping,damper:damping_n_s_per_m=20.")] = (
+        "ring-damping,energy-cycle,damper"
+    ),
+    seed: Annotated[int, typer.Option(help="Of all devices and hands; 7707 was not looked at.")] = 7707,
+    share: Annotated[float, typer.Option(help="Of 2000 presses, 490 hands of 20 s, 140 of 10 min, 540 starts.")] = 1.0,
+    front: Annotated[
+        bool, typer.Option("--front", help="ring-damping's settings and constant dampers: what excludes what.")
+    ] = False,
+    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("targets"),
+    cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file instead of the table.")] = False,
+) -> None:
+    """Hold laws against the targets of the default law: what holds, what it costs, what is felt.
+
+    With --front, settings of ring-damping and constant dampers over the same moving hands: settling against damping
+    and against pulls, with a picture. Interrupted, the same command goes on where it was.
+
+    Example: hapticd study targets --share 0.15    hapticd study targets --front --share 0.15
+    """
+    require_extra("study", "numpy", "numba", "matplotlib")
+    require_cluster(cluster)
+    if not 0.01 <= share <= 100.0:
+        raise ConfigError(f"--share {share:g}: must be from 0.01 to 100")
+    if not 0 <= seed < 10**18:
+        raise ConfigError(f"--seed {seed}: must be 0 or more and less than 1e18")
+    files = _FRONT if front else _TARGETS
+    require_folder(output, files)
+
+    from hapticd.offline.outcome import Criterion
+    from hapticd_studies.grid.run import kept, run
+    from hapticd_studies.law_spec import parse_laws
+    from hapticd_studies.targets.front import FRONT, draw
+    from hapticd_studies.targets.plan import MOVED_ONLY, TargetsPlan, size_of
+    from hapticd_studies.targets.report import front_of, front_table, json_of, table, targets_of
+
+    chosen = parse_laws(FRONT if front else laws, {})
+    plan = TargetsPlan(seed, size_of(share), chosen, Criterion(), MOVED_ONLY if front else ())
+    job = plan.job()
+    with kept(job, output / "targets.journal", fresh) as journal:
+        tables = plan.tables(run(job, journal, "targets", cluster))
+        if front:
+            points = front_of(plan, tables)
+            content = [json_of(plan, points), draw(points)]
+            shown = front_table(points)
+        else:
+            found = targets_of(plan, tables)
+            content = [json_of(plan, found)]
+            shown = table(plan, found)
+        for file, one in zip(files, content, strict=True):
+            write(output / file, one)
+    if as_json:
+        typer.echo((output / files[0]).read_text(), nl=False)
+        return
+    console = Console(highlight=False)
+    console.print(shown)
+    console.print(f"{output}: {', '.join(files)}", soft_wrap=True, markup=False)
