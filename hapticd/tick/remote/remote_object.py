@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from math import inf
 
 from hapticd.config.remote import PortLimits
 from hapticd.shapes.pose import Pose, Vector
+from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.remote.follower import Follower
 from hapticd.tick.remote.port import Port
@@ -149,6 +151,13 @@ class RemoteContact(SolidContact):
         self.ramp_s = ramp_s
         self._before_n_per_m = solid.stiffness_n_per_m
         self.port = RemoteObject(limits, self)
+
+    def reach(self) -> Proxy:
+        """Everywhere: it may come to a device that rests."""
+        everywhere = copy(self.solid.proxy)
+        everywhere.reach_x = everywhere.reach_y = everywhere.reach_z = everywhere.reach_w = 0.0
+        everywhere.reach_limit = inf
+        return everywhere
 
     def start(self, x: float, y: float, z: float) -> None:
         """Have the device at a point of the world, at rest and without force; the object stops where it is."""

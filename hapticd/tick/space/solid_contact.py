@@ -12,6 +12,7 @@ from math import inf, sqrt
 
 from hapticd.shapes.pose import Vector
 from hapticd.shapes.proxy import follow, place
+from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.space.channel import Channel, lay_along, slip_along
@@ -104,6 +105,10 @@ class SolidContact:
     def faded(self) -> bool:
         """Whether nothing is left of its force, nor to book."""
         return self.quiet or not any(channel.blending or channel.applied_n != 0.0 for channel in self.channels)
+
+    def reach(self) -> Proxy:
+        """What tells where the device may touch it, until its proxy is another."""
+        return self.solid.proxy
 
     def start(self, x: float, y: float, z: float) -> None:
         """Have the device at a point of the world, at rest and without force [m]."""

@@ -291,7 +291,7 @@ class SpaceTick(ControlTick):
 
     def _take_solids(self) -> None:
         """Run what the scene needs from now on."""
-        self._nearby = Nearby([contact.solid.proxy for contact in self.solids])
+        self._nearby = Nearby([contact.reach() for contact in self.solids])
         self.ports = [*(contact.port for contact in self._moving()), *self.couplings]
         self.has_ports = self.has_ports or bool(self.ports)
         self.has_objects = self.has_objects or bool(self.solids)  # and their books once they are gone
@@ -306,7 +306,7 @@ class SpaceTick(ControlTick):
         self._held = [contact for contact in self._held if contact in self._fading or contact in self.solids]
         resting = []
         for at, contact in enumerate(self.solids):
-            if at in near or not contact.quiet or contact.moves:
+            if at in near or not contact.quiet:
                 if id(contact) not in before and contact.quiet:
                     contact.start(*self._at)
                 self.awake.append(contact)
