@@ -263,7 +263,7 @@ class ControlTick:
             totals.ledger.absorb(contact.ledger)
         totals.add(self.past_ports)
         for port in (*self.couplings, *self.leaving_ports):
-            totals.add(port.books)
+            totals.add_moving(port.books)
 
     def port_work_j(self) -> float:
         """What the clients of all couplings and forces there ever were have put in [J]."""
@@ -384,7 +384,7 @@ class ControlTick:
         """Go on with other ports; of those that were gone before, the ones that have let go leave the books."""
         arrangement.take()
         for port in [port for port in self.leaving_ports if port.asleep]:
-            self.past_ports.add(port.books)
+            self.past_ports.add_moving(port.books)
             self.leaving_ports.remove(port)
         self.leaving_ports += arrangement.gone
         self.couplings = arrangement.ports

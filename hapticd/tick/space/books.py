@@ -46,10 +46,14 @@ class Totals:
     def add(self, contact: HasBooks) -> None:
         """Add one contact, or sums over several."""
         self.ledger.absorb(contact.ledger)
-        self.ledger.energy_j -= contact.carried_j
         self.moved_j += contact.moved_j
         self.friction_j += contact.friction_j
         self.friction_stored_j += contact.friction_stored_j
+
+    def add_moving(self, contact: HasBooks) -> None:
+        """Add one that may have moved by itself."""
+        self.add(contact)
+        self.ledger.energy_j -= contact.carried_j
 
 
 class SpaceBooks:
@@ -69,7 +73,7 @@ class SpaceBooks:
 
     def close(self, contact: HasBooks) -> None:
         """This one is gone."""
-        self._gone.add(contact)
+        self._gone.add_moving(contact)
 
     def totals(self, awake: Iterable[HasBooks]) -> Totals:
         """Sums over all there ever were.
@@ -81,5 +85,5 @@ class SpaceBooks:
         totals.add(self._gone)
         totals.add(self._resting)
         for contact in awake:
-            totals.add(contact)
+            totals.add_moving(contact)
         return totals
