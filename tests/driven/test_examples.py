@@ -34,6 +34,15 @@ def said(daemon: Daemon, name: str, duration_s: float) -> str:
     return done.stdout
 
 
+def test_a_wall_that_is_moved_lifts_the_hand() -> None:
+    with Daemon((EXAMPLES / "wall.toml").read_text()) as daemon:
+        found = re.fullmatch(
+            r"the wall lifted the hand with up to (\d+\.\d) N\n", said(daemon.wait_ready(), "moving_wall.py", 2.0)
+        )
+    assert found
+    assert 0.5 < float(found[1]) < 6.0
+
+
 def test_a_curl_field_pushes_across_the_motion(daemon: Daemon) -> None:
     found = re.fullmatch(r"pushed with (\S+) and (\S+) N at the end\n", said(daemon, "force_field.py", 1.0))
     assert found
