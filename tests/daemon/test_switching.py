@@ -179,15 +179,23 @@ def taped(daemon: Daemon) -> Iterator[Tape]:
 
 @dataclass(frozen=True)
 class Holding:
-    """What a process holds."""
+    """What a process holds.
+
+    Attributes:
+        memory_kib: its own. Shared pages are left out: those of the ring of records count for the supervisor only once
+            it has read them, 12 MiB in its first seconds, whether anything is switched or not.
+        descriptors: open ones.
+    """
 
     memory_kib: int
     descriptors: int
 
     @classmethod
     def of(cls, pid: int) -> Holding:
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-        return cls(pages * os.sysconf("SC_PAGE_SIZE") // 1024, len(list(Path(f"/proc/{pid}/fd").iterdir())))
+        resident, shared = map(int, Path(f"/proc/{pid}/statm").read_text().split()[1:3])
+        return cls(
+            (resident - shared) * os.sysconf("SC_PAGE_SIZE") // 1024, len(list(Path(f"/proc/{pid}/fd").iterdir()))
+        )
 
 
 def explained_n(before: Choice, after: Choice, leaving: bool, tape: Tape, seq: int) -> tuple[float, float]:
@@ -288,7 +296,7 @@ def switch_at_random(daemon: Daemon, count: int, record_property: Report) -> Non
         record_property(name, value)
     assert at_switches <= 3 * elsewhere + 0.05 * len(tape.switched)
     assert [descriptors for _, descriptors in grown] == [0, 0]
-    assert grown[0][0] <= 8192
+    assert grown[0][0] <= 2048
     assert grown[1][0] <= 512
 
 
