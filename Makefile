@@ -46,7 +46,7 @@ run: $(READY_RUN)
 # Most of the time is spent waiting for daemons that run in real time, so more workers than the two processors of CI; but
 # with four, real-time loops, their supervisors and compilers hold each other up too often.
 test: packages lint web clients
-	$(BIN)/pytest --numprocesses 3 --dist loadfile --max-worker-restart 0
+	$(BIN)/pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 lint: $(READY)
 	$(BIN)/ruff check

@@ -16,6 +16,7 @@ from hypothesis import settings
 
 from tests import repeating
 from tests.examples import TIMES, examples
+from tests.longest import LONGEST, ROOT, rank
 
 IN_CI = os.environ.get("CI") == "true"
 
@@ -31,6 +32,14 @@ def pytest_configure() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     if repeating.REPEAT > 1:
         repeating.watch_for_daemons()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that take longest; in a file everything stays in order."""
+    missing = [name for name in LONGEST if not (ROOT / name).exists()]
+    if missing:
+        raise pytest.UsageError(f"tests/longest.py names what is not there: {', '.join(missing)}")
+    items.sort(key=lambda item: rank(item.path))
 
 
 @pytest.fixture(scope="session")

@@ -27,7 +27,7 @@ SOURCES = sorted(
         ".ci",
     )
     for path in (ROOT / folder).rglob("*")
-    if path.is_file() and "__pycache__" not in path.parts and path != Path(__file__)
+    if path.is_file() and path.suffix != ".png" and "__pycache__" not in path.parts and path != Path(__file__)
 )
 PYTHON = [path for path in SOURCES if path.suffix == ".py"]
 

@@ -41,7 +41,7 @@ class DrivenState:
 
     Attributes:
         force_n: its force on the device, one element an axis [N].
-        impulse_n_s: that force summed over time, since the daemon has it [N s].
+        impulse_n_s: what pulls at the target, summed over time since the daemon has it [N s].
         target_m: where the target or the object was in this tick, behind what was sent for it by the limits [m].
         seq: the client's number of the message in force; -1 when there is none.
         age_s: how old what it says was, since the daemon took it [s].

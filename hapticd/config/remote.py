@@ -33,8 +33,9 @@ class CouplingConfig(Table):
     max_speed_m_per_s: float = Field(1.0, gt=0.0, le=10.0, description="how fast a target that jumps is followed [m/s]")
     driven: bool = Field(
         False,
-        description="true: a motor of the client's own moves the target, such as a path or a robot, and the law leaves "
-        "that work alone; false: the client's world gives back what it gets, and what it gives more is damped",
+        description="true: the law sees the device against the target and damps between the two, as for a target that "
+        "a motor moves and for a hand that moves a tool; false: it sees the device alone and damps it against the "
+        "ground, so that what a late client gives back beyond what it got is damped too",
     )
 
 
@@ -69,7 +70,7 @@ class PortLimits:
         max_force_n: largest force on the device [N]; 0: an object has no limit but the guard's.
         max_speed_m_per_s: how fast it is followed [m/s]; 0: a force goes nowhere.
         unchanged_s: how long a force may stay the same [s]; 0: as long as it is sent.
-        driven: whether a motor of the client's own moves it.
+        driven: whether the law sees the device against the target, and not alone.
     """
 
     name: str

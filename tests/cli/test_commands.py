@@ -206,7 +206,7 @@ def test_check_prints_a_line_for_each_good_file_and_every_problem_of_the_others(
     assert done.returncode == 2
     (line,) = done.stdout.splitlines()
     assert line.startswith(f"{GOOD}: ok, ")
-    assert line.endswith(", loopback with energy-cycle at 1000 Hz")
+    assert line.endswith(", loopback with ring-damping at 1000 Hz")
     assert [problem.split(": ")[:2] for problem in done.stderr.splitlines()] == [
         [str(bad), "loop.rate_hz = 50"],
         [str(bad), 'controller.law = "tdap"'],
@@ -218,7 +218,7 @@ def test_check_as_json_says_the_same(bad: Path) -> None:
     done = hapticd("check", "--json", GOOD, bad)
     good, wrong = json.loads(done.stdout)
     assert (done.returncode, done.stderr) == (2, "")
-    assert (good["ok"], good["driver"], good["law"], good["rate_hz"]) == (True, "loopback", "energy-cycle", 1000.0)
+    assert (good["ok"], good["driver"], good["law"], good["rate_hz"]) == (True, "loopback", "ring-damping", 1000.0)
     assert good["sha256"].startswith(good["hash"])
     assert (wrong["ok"], len(wrong["problems"])) == (False, 2)
 
@@ -260,7 +260,7 @@ def test_config_show_fills_in_the_defaults() -> None:
     shown = tomllib.loads(hapticd("config", "show", GOOD).stdout)
     assert shown["safety"]["ramp_s"] == 0.05
     assert shown["device"]["options"]["mass_kg"] == 0.25
-    assert shown["controller"]["params"]["rule"] == "non-decreasing"
+    assert shown["controller"]["params"]["pull_after"] == 2
 
 
 def test_config_show_of_a_bad_file_prints_its_problems(bad: Path) -> None:

@@ -21,6 +21,8 @@ HAND = "hand = { force = { profile = 'constant', newton = -3.0 }, stiffness_n_pe
 DEVICE = f"[device.options]\n{HAND}"
 WALL = "[[scene.walls]]\nstiffness_n_per_m = 12000.0\n"
 BASE = DEVICE + WALL
+COUPLING = "[[scene.couplings]]\nname = 'tool'\nstiffness_n_per_m = 500.0\nmax_force_n = 6.0\n"
+FORCE = "[[scene.forces]]\nname = 'field'\nmax_force_n = 3.0\n"
 
 LOOP: dict[str, tuple[str, Callable[[Bench], object], object]] = {
     "scene.walls[].axis": (WALL + "axis = 'y'\n", lambda bench: bench.tick.contacts[0].wall.config.axis, "y"),
@@ -59,14 +61,61 @@ LOOP: dict[str, tuple[str, Callable[[Bench], object], object]] = {
         lambda bench: bench.ticks(2).contacts[0].wall.damping_n_s_per_m,
         3.0,
     ),
+    "scene.couplings[].name": (
+        WALL + COUPLING.replace("tool", "probe"),
+        lambda bench: bench.tick.ports[0].name,
+        "probe",
+    ),
+    "scene.couplings[].stiffness_n_per_m": (
+        WALL + COUPLING.replace("500.0", "400.0"),
+        lambda bench: bench.tick.ports[0].limits.stiffness_n_per_m,
+        400.0,
+    ),
+    "scene.couplings[].damping_n_s_per_m": (
+        WALL + COUPLING + "damping_n_s_per_m = 2.0\n",
+        lambda bench: bench.tick.ports[0].limits.damping_n_s_per_m,
+        2.0,
+    ),
+    "scene.couplings[].driven": (
+        WALL + COUPLING + "driven = true\n",
+        lambda bench: bench.tick.ports[0].limits.driven,
+        True,
+    ),
+    "scene.couplings[].max_force_n": (
+        WALL + COUPLING.replace("= 6.0", "= 4.0"),
+        lambda bench: bench.tick.ports[0].limits.max_force_n,
+        4.0,
+    ),
+    "scene.couplings[].hold_s": (
+        WALL + COUPLING + "hold_s = 0.2\n",
+        lambda bench: bench.tick.ports[0].limits.hold_s,
+        0.2,
+    ),
+    "scene.couplings[].max_speed_m_per_s": (
+        WALL + COUPLING + "max_speed_m_per_s = 0.5\n",
+        lambda bench: bench.tick.ports[0].limits.max_speed_m_per_s,
+        0.5,
+    ),
+    "scene.forces[].name": (WALL + FORCE.replace("field", "wind"), lambda bench: bench.tick.ports[0].name, "wind"),
+    "scene.forces[].max_force_n": (
+        WALL + FORCE.replace("= 3.0", "= 2.0"),
+        lambda bench: bench.tick.ports[0].limits.max_force_n,
+        2.0,
+    ),
+    "scene.forces[].hold_s": (WALL + FORCE + "hold_s = 0.2\n", lambda bench: bench.tick.ports[0].limits.hold_s, 0.2),
+    "scene.forces[].unchanged_s": (
+        WALL + FORCE + "unchanged_s = 0.0\n",
+        lambda bench: bench.tick.ports[0].limits.unchanged_s,
+        0.0,
+    ),
     "controller.law": (
         WALL + "[controller]\nlaw = 'tdpa'\n",
         lambda bench: bench.tick.contacts[0].law.module.__name__,
         "hapticd_controllers.tdpa",
     ),
     "controller.params": (
-        WALL + "[controller.params]\nwindow = 3\n",
-        lambda bench: bench.tick.contacts[0].law.params.window,
+        WALL + "[controller.params]\npull_after = 3\n",
+        lambda bench: bench.tick.contacts[0].law.params.pull_after,
         3,
     ),
     "safety.profile": (WALL + "[safety]\nprofile = 'simulation'\n", lambda bench: settled(bench).max_force_n, 12.0),
@@ -117,11 +166,20 @@ RESTART = {
     "telemetry.tcp": f"{DEVICE}[telemetry]\ntcp = 'tcp://127.0.0.1:9871'\n",
     "telemetry.send_high_water": f"{DEVICE}[telemetry]\nsend_high_water = 500\n",
     "control.tcp": f"{DEVICE}[control]\ntcp = 'tcp://127.0.0.1:9870'\n",
+    "remote.law": f"{DEVICE}[remote]\nlaw = 'tdpa'\n",
+    "remote.params": f"{DEVICE}[remote.params]\nwindow = 3\n",
+    "remote.scene_tcp": f"{DEVICE}[remote]\nscene_tcp = 'tcp://127.0.0.1:9868'\n",
+    "remote.state_tcp": f"{DEVICE}[remote]\nstate_tcp = 'tcp://127.0.0.1:9869'\n",
+    "remote.lease_s": f"{DEVICE}[remote]\nlease_s = 2.0\n",
 }
 """What is refused."""
 
 
-BEFORE = {"safety.profile": "[safety]\nmax_force_n = 5.0\n"}
+BEFORE = {
+    "safety.profile": "[safety]\nmax_force_n = 5.0\n",
+    **{key: COUPLING for key in LOOP if key.startswith("scene.couplings")},
+    **{key: FORCE for key in LOOP if key.startswith("scene.forces")},
+}
 """What is in force before, where the defaults would show no difference."""
 
 

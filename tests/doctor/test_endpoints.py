@@ -200,7 +200,7 @@ def test_fault_records_need_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 def test_a_good_file_is_described_as_check_does() -> None:
     path = directory("config") / "hapticd.toml"
-    says(configuration.usable(Wanted.of(path)), "ok", f"{path}: ok", "loopback with energy-cycle at 1000 Hz")
+    says(configuration.usable(Wanted.of(path)), "ok", f"{path}: ok", "loopback with ring-damping at 1000 Hz")
 
 
 def test_every_problem_of_a_file_is_a_finding(tmp_path: Path) -> None:

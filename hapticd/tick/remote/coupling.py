@@ -22,8 +22,8 @@ class Coupling(OnePort):
 
     It pulls as well as it pushes, so that its laws see a contact that is not lost while it is held. A law sees the
     device's own motion: what the client gives back beyond what it got, since it is late, is energy that the law damps.
-    Of a target that is driven, by a motor of the client's, a law sees the motion of the device against the target
-    instead; the motor's work is none of its business.
+    Its damping acts against the ground. Where `driven` a law sees the motion of the device against the target instead,
+    and its damping acts between the two: what moves the target is none of its business.
 
     Args:
         limits: what it may do.

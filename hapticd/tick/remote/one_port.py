@@ -243,8 +243,9 @@ class OnePort(Port):
 
     def _go_on(self, passed_s: float) -> None:
         """Count time: of the client's silence, of the ramps, of the force that was held."""
-        for axis, newton in enumerate(self.force_n):
-            self.impulse_n_s[axis] += newton * passed_s
+        driven = self.limits.driven
+        for axis, channel in enumerate(self.channels):
+            self.impulse_n_s[axis] += (channel.applied_n if driven else channel.own_n) * passed_s
         self.pass_time(passed_s)
         step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
         if self.state is _HELD:

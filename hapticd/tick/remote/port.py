@@ -30,7 +30,8 @@ class Port:
         seq: the client's own number of the message that is in force; -1: none is.
         age_s: how long ago the last one was taken [s].
         force_n: force on the device that was applied last, one element an axis [N].
-        impulse_n_s: the sum of force times how long it was applied, since the port exists [N s].
+        impulse_n_s: the sum of the port's own force times how long it was applied, since the port exists. The law's
+            damping is in it where it acts against the target; against the ground, its reaction is no client's [N s].
         target_m: where the followed target is; of a force 0 [m].
         news: what has become of it since it was last asked; the loop takes and clears it.
     """

@@ -29,7 +29,7 @@ class PortRecord:
         work_j: what its client has put in, less what it took [J].
         target_m: where the followed target is, one element an axis [m].
         force_n: on the device [N].
-        impulse_n_s: the sum of force times how long it was applied [N s].
+        impulse_n_s: the sum of what pulls at the target times how long it was applied [N s].
     """
 
     index: int

@@ -26,7 +26,7 @@ app = lazy_group(
         ),
         "targets": (
             f"{_COMMANDS}.targets:command",
-            "Hold laws against what was asked of the default law, and show what its settings trade for each other.",
+            "Hold laws against the targets of the default law: what holds, what it costs, what is felt.",
         ),
         "accuracy": (
             f"{_COMMANDS}.accuracy:command",
@@ -43,11 +43,11 @@ app = lazy_group(
         ),
         "remote": (
             f"{_COMMANDS}.remote:command",
-            "Press what late programs render, under every law, and say what stiffness they get.",
+            "Press what other programs render, late and unevenly, and say what stiffness they get under each law.",
         ),
         "space-robustness": (
             f"{_COMMANDS}.space_robustness:command",
-            "Let random hands touch random surfaces in space under some laws, and count who is steady.",
+            "Let random hands press, stroke, tap, circle and let go of surfaces in space, and count who is steady.",
         ),
         "extremes": (
             f"{_COMMANDS}.extremes:command",

@@ -28,7 +28,7 @@ def command(
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,
 ) -> None:
-    """Let random hands press, stroke, tap, circle and let go of random surfaces in space, and count who is steady.
+    """Let random hands press, stroke, tap, circle and let go of surfaces in space, and count who is steady.
 
     The daemon's own tick on the simulated device of three axes, friction included, one process a core. Every case is a
     configuration: --only prints it, for `hapticd simulate`. Writes CSV and JSON. Interrupted, the same command goes on

@@ -61,7 +61,7 @@ def judged(case: Case, law: LawSpec, criterion: Criterion) -> list[float]:
     way = np.array(path)
     period_s = case.period_s
     end = way[-round(WINDOW_S / period_s) :]
-    limit_m = max(criterion.still_m, criterion.still_counts * float(loaded.options.resolution_m))  # type: ignore[attr-defined]
+    limit_m = criterion.still_limit_m(space.options)
     if case.hand in ("press", "let go"):
         felt = _length(felt_index(axis, period_s) for axis in end.T)
         span_m = _length(np.ptp(way[-round(criterion.window_s / period_s) :], axis=0))

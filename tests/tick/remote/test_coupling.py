@@ -315,3 +315,18 @@ def test_the_impulse_is_the_sum_of_the_forces_that_were_held() -> None:
         if n % 7 == 0:
             assert apart(rig["tool"].impulse_n_s, sums) < 1e-12
     assert length(sums) > 0.1
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_damping_against_the_ground_pulls_at_no_target(driven: bool) -> None:
+    """A client moves its body by the impulse: a damper between the two is felt there, one against the ground is not."""
+    rig = Rig(COUPLING.replace("damping_n_s_per_m = 5.0", f"driven = {str(driven).lower()}"), law="damper")
+    held_at(rig, [0.0], 100)
+    before, spring = rig["tool"].impulse_n_s[0], 0.0
+    for n in range(1, 20):
+        rig.say("tool", position_m=[0.0])
+        rig.go([1e-5 * n])
+        spring += -2000.0 * 1e-5 * n * PERIOD_S
+    rig.go()
+    pulled = rig["tool"].impulse_n_s[0] - before
+    assert (pulled == pytest.approx(spring, rel=0.02)) is not driven

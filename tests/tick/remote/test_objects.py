@@ -8,6 +8,7 @@ from itertools import pairwise
 import pytest
 
 from hapticd.tick.remote.port import PortState
+from hapticd.tick.space.tick import SpaceTick
 from tests.tick.remote.rig import MOST_N, PERIOD_S, RAMP_S, Hand, Rig, length
 
 PLANE = """
@@ -188,5 +189,6 @@ def test_it_goes_on_under_its_name_and_place_through_a_reload_and_fades_out_with
 def test_what_a_client_moves_is_no_part_of_what_rests_beside_it() -> None:
     still = BALL.replace('"ball"', '"still"').replace("remote = true", "")
     rig = Rig(still + BALL, axes="xyz")
-    assert [contact.solid.name for contact in rig.tick.solids] == ["still", "ball"]  # type: ignore[attr-defined]
+    assert isinstance(rig.tick, SpaceTick)
+    assert [contact.solid.name for contact in rig.tick.solids] == ["still", "ball"]
     assert [port.name for port in rig.ports] == ["ball"]
