@@ -118,6 +118,8 @@ def _measured(
     sent_ns: dict[int, int] = {}
     heard_ns: dict[int, int] = {}
     driver.hear()
+    if not timing.receive(PATIENCE_S):  # from the first one on it hears of every tick
+        raise TimeoutError(f"no ticks for {PATIENCE_S:g} s")
     for _ in range(messages):
         time.sleep(dice.uniform(0.0, 0.005))
         sent, applied, heard = driver.send()
