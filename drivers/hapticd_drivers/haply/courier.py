@@ -9,6 +9,7 @@ import time
 from typing import Any
 
 from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DriverError
+from hapticd_drivers.scheduling import LOOK_EVERY_TICKS, follow_caller
 
 OPEN_S = 2.0
 """How long the service may take to be reached, and to say what is there [s]."""
@@ -50,6 +51,7 @@ class Courier(threading.Thread):
         self._url = url
         self._outgoing: str | None = None
         self._ending = False
+        self._until_look = 0
         self._lock = threading.Lock()
         self._reached = threading.Event()
         self._came = threading.Event()
@@ -64,6 +66,10 @@ class Courier(threading.Thread):
 
     def send(self, message: str) -> None:
         """Send a message, instead of the one that still waits; does not wait."""
+        self._until_look -= 1
+        if self._until_look < 0:
+            self._until_look = LOOK_EVERY_TICKS
+            follow_caller(self)
         with self._lock:  # held for a moment only, by either side
             if self._outgoing is not None:
                 self.dropped += 1

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import threading
 from collections import deque
 from collections.abc import Callable
+
+from hapticd_drivers.scheduling import LOOK_EVERY_TICKS, follow_caller
 
 END_S = 1.0
 """How long the last reports may take before they are left behind [s]."""
 
 MOST_WAITING = 64
 """Orders that may wait for a write that stalls; whoever waits for an answer repeats them."""
-
-LOOK_EVERY_TICKS = 32
-"""How often the outbox looks whether its caller is scheduled in another way than before."""
 
 
 class Outbox(threading.Thread):
@@ -118,13 +115,6 @@ class Outbox(threading.Thread):
                 pass  # the end has opened it in between, beside a calibration that was called off
 
     def _follow_caller(self) -> None:
-        """Be scheduled as the loop is, which becomes a real-time thread only after it has opened its device.
-
-        At a lower priority a busy computer would keep this thread from its work, and the loop with it whenever this
-        thread holds the interpreter. A calibration sends from a thread of its own, so it is looked at again and again.
-        """
+        """Be scheduled as the loop is. A calibration sends from a thread of its own, so it is looked at again."""
         self._until_look = LOOK_EVERY_TICKS
-        with contextlib.suppress(OSError):  # it has ended
-            policy = os.sched_getscheduler(0)
-            if self.native_id is not None and os.sched_getscheduler(self.native_id) != policy:
-                os.sched_setscheduler(self.native_id, policy, os.sched_getparam(0))
+        follow_caller(self)

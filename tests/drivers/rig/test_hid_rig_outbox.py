@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd_drivers.rig.hid_rig_outbox import LOOK_EVERY_TICKS, MOST_WAITING, Outbox
+from hapticd_drivers.rig.hid_rig_outbox import MOST_WAITING, Outbox
+from hapticd_drivers.scheduling import LOOK_EVERY_TICKS
 from tests.daemon.running import PATIENCE_S, wait_until
 
 GRACE_S = 0.2
