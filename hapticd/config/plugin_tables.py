@@ -40,6 +40,6 @@ class RemoteLawTable(Table):
         "energy-cycle",
         min_length=1,
         description="law of couplings and forces, installed or an importable module: what is late makes energy, which "
-        "that of [controller] need not look at (docs/remote.md)",
+        "that of [controller] need not look at (docs/couplings.md)",
     )
     params: dict[str, Any] = Field(default_factory=dict, description="that law's own parameters")
