@@ -81,6 +81,7 @@ def test_a_law_that_imports_for_ten_seconds_is_waited_for_and_the_watchdog_fed(d
 
 
 def test_a_law_that_fails_late_is_refused_late_and_changes_nothing(daemon: Daemon) -> None:
+    wait_until(lambda: command("status")["status"]["config_hash"] != "", "the first status")
     before = command("status")["status"]["config_hash"]
     with reload(daemon, "broken") as asking:
         _, said = asking.communicate(timeout=PATIENCE_S)
