@@ -27,9 +27,6 @@ name = "tool"
 stiffness_n_per_m = 300.0
 max_force_n = {MAX_FORCE_N}
 hold_s = 0.3
-
-[remote]
-law = "none"
 """
 
 

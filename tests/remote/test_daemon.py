@@ -33,13 +33,16 @@ from tests.remote.stage import (
 LARGEST_STEP_N = 0.5
 """In a period; the force that is let go would be more than four times that at once."""
 
-FIRM = CONFIG.replace("damping_n_s_per_m = 5.0 }", "damping_n_s_per_m = 5.0, stiffness_n_per_m = 300.0 }")
+UNDAMPED = CONFIG + '[remote]\nlaw = "none"\n'
+"""What a law takes is none of what is looked at here."""
+
+FIRM = UNDAMPED.replace("damping_n_s_per_m = 5.0 }", "damping_n_s_per_m = 5.0, stiffness_n_per_m = 300.0 }")
 """A hand that is not drawn along, so that there is a force to let go of."""
 
 
 @pytest.fixture(scope="module")
 def daemon() -> Iterator[Daemon]:
-    with Daemon(CONFIG) as daemon:
+    with Daemon(UNDAMPED) as daemon:
         yield daemon.wait_ready()
 
 
