@@ -4,9 +4,9 @@ A slot a port:
 
     counter, odd while the slot is being written | list of ports that it is for | the update
 
-The word `REMOTE` counts the updates written, so that a tick in which there was none compares one number. Which list of
-ports an update is for is told by `list_of`, the same on either side: after a reload an update under way for the list
-before is not taken for another name.
+The word `REMOTE` counts the updates written, so that a tick in which there was none compares one number. `list_of`
+numbers the list of ports that an update is for, the same on either side: after a reload an update for the list before
+is not taken for another name.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ IDLE_S = 0.01
 """The same while it is not told to any client, or is late [s]."""
 
 STATUS_S = 1.0
-"""How often the supervisor is told what was counted [s]."""
+"""Time between two reports of the counts to the supervisor [s]."""
 
 _MOST_BEHIND = 100  # ticks that are told late; of those before them clients see the gap
 _EARLY_NS = 20_000

@@ -40,7 +40,7 @@ def test_the_firmware_leaves_half_of_flash_and_ram_free(
     used = {name: float(percent) for name, percent in re.findall(r"(\w+):\s+\d+ bytes \((\d+\.\d)% Full\)", size)}
     record_property("flash_percent", used["Program"])
     record_property("ram_percent", used["Data"])
-    print(kind, size)  # noqa: T201 - the figures, for whoever runs this with -s
+    print(kind, size)  # noqa: T201 - the figures, shown with pytest -s
     assert 1.0 < used["Program"] < 50.0
     assert 1.0 < used["Data"] < 50.0
 

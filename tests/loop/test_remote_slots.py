@@ -1,4 +1,4 @@
-"""What clients say reaches the loop: the newest, whole, for the port that was meant, whoever dies in between."""
+"""What clients say reaches the loop: the newest, whole, for the port that was meant, whatever process dies."""
 
 from __future__ import annotations
 

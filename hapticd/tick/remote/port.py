@@ -9,7 +9,7 @@ from hapticd.tick.remote.update import RELEASED, Update
 __all__ = ["QUIET_S", "Port", "PortState"]
 
 QUIET_S = 1.0
-"""A port that is let go and taken up again and again is told of once in this time [s]."""
+"""Shortest time between two events about one port [s]."""
 
 
 _HELD, _STALE, _RELEASED = PortState.HELD, PortState.STALE, PortState.RELEASED

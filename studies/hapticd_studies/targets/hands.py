@@ -20,7 +20,7 @@ from hapticd_studies.transparency.runs import columns_of
 from hapticd_studies.transparency.scores import weighted_damping
 
 KNOWN_S = 10.0
-"""A hand that has been there for so long is no stranger to the law."""
+"""After this time the law has learnt what it can of a hand."""
 
 FIRMER = 3.0
 STIFFENS_S = 0.5 * arrivals.DURATION_S

@@ -24,7 +24,7 @@ STOP_M = {"uno": -0.049, "hapkit": -0.034}
 """A handle that is further down is at the lower stop [m]."""
 
 ATTEMPTS = 5
-"""A computer that is too busy may miss so many deadlines that the loop lets go, or starve the simulated processor until
+"""A busy computer may miss enough deadlines for the loop to let go, or starve the simulated processor until
 it looks lost: that tells nothing of the driver."""
 
 
