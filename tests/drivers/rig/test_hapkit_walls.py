@@ -76,7 +76,7 @@ def test_the_default_law_holds_a_wall_that_shakes_without_one(
         found_m = places_m(board, law, monkeypatch)
         swing_m = max(found_m) - min(found_m)
         if still:
-            assert swing_m <= 5.0 * COUNT_M  # ring-damping leaves a few counts of a coarse sensor that is late
+            assert swing_m < 4.5 * COUNT_M  # four counts: ring-damping leaves as many of a coarse sensor that is late
             depth_m = PRESS_N / STIFFNESS_N_PER_M
             assert sum(found_m) / SETTLED == pytest.approx(WALL_M - HELD_M - depth_m, abs=0.1 * depth_m)
         else:
