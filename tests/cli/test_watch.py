@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import fcntl
 import itertools
 import json
@@ -22,18 +21,11 @@ from typing import Any
 
 import pyte
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hapticd.cli import main
-from hapticd.cli.watch.plot import SLICE_S, Trace, axis, bars, plot
-from hapticd.cli.watch.screen import frame, one_line, si
-from hapticd.cli.watch.state import ScreenState
-from hapticd.client import Cycle, Damping, Energy, Event, Position, Status
-from hapticd.telemetry.records import LateHistogram, late_ticks
+from hapticd.client import Status
 from hapticd.tick import event as contract
 from hapticd_bench.telemetry import synthetic_records
-from tests.examples import examples
 from tests.telemetry.sockets import PATIENCE_S, Wire
 
 HAPTICD = str(Path(sys.executable).with_name("hapticd"))
@@ -320,134 +312,3 @@ def test_json_is_a_line_a_status(feed: Feed) -> None:
         assert status["late_histogram"] == list(HISTOGRAM)
         assert status["warnings"] == list(STATUS.warnings)
     assert json.loads(plain(feed, "--json", "--once", until=lambda _: False))["law"] == "energy-cycle"
-
-
-NUMBERS = st.floats(-1e300, 1e300) | st.floats(-1.0, 1.0)
-
-
-@examples(50)
-@given(
-    width=st.integers(1, 200),
-    height=st.integers(1, 60),
-    axes=st.integers(1, 3),
-    walls=st.integers(0, 8),
-    numbers=st.lists(NUMBERS, min_size=1, max_size=40),
-    flags=st.tuples(st.booleans(), st.booleans(), st.booleans(), st.booleans()),
-    warnings=st.lists(st.text(), max_size=4),
-    metrics=st.dictionaries(st.text(alphabet="abc_", max_size=30), NUMBERS, max_size=8),
-)
-def test_whatever_is_known_the_picture_has_the_size_of_the_terminal(
-    width: int,
-    height: int,
-    axes: int,
-    walls: int,
-    numbers: list[float],
-    flags: tuple[bool, ...],
-    warnings: list[str],
-    metrics: dict[str, float],
-) -> None:
-    known = ScreenState()
-    armed, fallback, latched, told = flags
-    if told:
-        texts = tuple(" ".join(one.split()) for one in warnings)
-        status = Status(armed=armed, fallback=fallback, latched=latched, warnings=texts, axes=("x",) * axes)
-        known.take([dataclasses.replace(status, device_metrics=metrics)], 0.0)
-    for index, number in enumerate(numbers):
-        vector, at_s = (number,) * axes, index * 0.03
-        known.take([Position(at_s, index, vector, vector, vector, (numbers[0],) * axes)], 0.0)
-        known.take([Energy(at_s, index, number, number, number, number)], 0.0)
-        known.take([Damping(at_s, index, (number,) * walls, (armed,) * walls, (number,) * walls)], 0.0)
-        known.take([Cycle(at_s, index, 0, index, number, number, number, number)], 0.0)
-        known.take([Event(at_s, index, 100 * index % 400, "text " * (index % 9))], 0.0)
-    lines = frame(known, "ipc:///run/hapticd/default/telemetry", width, height, 1.0)
-    assert [line.cell_len for line in lines] == [width] * height
-
-
-def test_a_latched_fault_says_how_to_go_on() -> None:
-    known = ScreenState()
-    known.take([Status(latched=True, law="tdpa")], 0.0)
-    text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
-    assert "LATCHED" in text
-    assert "hapticd clear" in text
-
-
-@pytest.mark.parametrize("armed", [True, False])
-def test_a_force_is_shown_as_limited_only_where_forces_are_let_through(armed: bool) -> None:
-    known = ScreenState()
-    applied_n = (12.0,) if armed else (0.0,)
-    known.take([Status(armed=armed, axes=("z",)), Position(0.0, 1, (-0.1,), (0.0,), applied_n, (300.0,))], 0.0)
-    text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
-    assert ("limited" in text) == armed
-
-
-def test_a_device_that_is_not_calibrated_says_what_it_waits_for() -> None:
-    known = ScreenState()
-    known.take([Status(calibrated=False, law="tdpa")], 0.0)
-    text = "\n".join(line.plain for line in frame(known, "ipc:///x", 100, 24, 0.0))
-    assert "hapticd calibrate" in text
-
-
-def test_late_ticks_are_those_of_160_us_and_more() -> None:
-    histogram = LateHistogram()
-    for late_us in (0.0, 159.0, 160.0, 161.0, 20000.0):
-        histogram.add(late_us)
-    assert late_ticks(histogram.counts) == 3
-    assert late_ticks(Status().late_histogram) == 0
-
-
-def test_one_line_names_each_axis() -> None:
-    known = ScreenState()
-    known.take([Status(axes=("x", "y"), law="none"), Position(0.0, 1, (1e-3, -2e-3), (), (1.0, 0.0), ())], 0.0)
-    assert "disarmed  none" in one_line(known)
-    assert "x +1.000 mm +1.00 N  y -2.000 mm +0.00 N" in one_line(known)
-
-
-def test_a_trace_keeps_the_extremes_of_every_slice() -> None:
-    """An oscillation far faster than a column of dots is still seen in full."""
-    trace = Trace(1)
-    for index in range(1000):
-        trace.add(index * 1e-3, ((-1.0) ** index,))
-    assert trace.window(5) == [([-1.0], [1.0])] * 5
-    trace.add(0.0, (7.0,))  # the clock of another daemon
-    assert trace.window(3) == [None, None, ([7.0], [7.0])]
-
-
-def test_a_plot_puts_values_where_its_axis_says() -> None:
-    trace = Trace(1)
-    for index in range(20):
-        trace.add(index * SLICE_S * 1.001, (float(index),))
-    lines = [line.plain for line in plot(trace, 17, 5, ["cyan"], marks=(0.0,))]
-    assert lines[0].strip().startswith("20")
-    assert lines[-1].strip().startswith("0")
-    assert lines[0].rstrip()[-1] != "20"
-    assert [bool(set(line[7:]) - {" ", "┈"}) for line in lines] == [True] * 5
-    assert lines[-1].index("⣀" if "⣀" in lines[-1] else lines[-1][7]) == 7
-
-
-@given(st.floats(-1e6, 1e6), st.floats(0.0, 1e6), st.floats(1e-3, 10.0))
-def test_an_axis_holds_its_values_and_is_round(lowest: float, length: float, least: float) -> None:
-    bottom, top = axis(lowest, lowest + length, least)
-    slack = 1e-6 * max(1.0, abs(lowest) + length)
-    assert bottom <= lowest + slack
-    assert top >= lowest + length - slack
-    assert top - bottom >= 0.999 * least
-
-
-def test_bars_hide_nothing_that_is_not_zero() -> None:
-    assert bars([0.0, 0.001, 4.0, 8.0]) == " ▁▄█"
-    assert bars([0.0, 0.0]) == "  "
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0, "0 J"),
-        (0.0123, "12.3 mJ"),
-        (12000.0, "12.0 kJ"),
-        (0.9999, "1.00 J"),
-        (-3.2e-4, "-320 µJ"),
-        (4e-12, "0.00 nJ"),
-    ],
-)
-def test_numbers_have_three_digits_and_a_prefix(value: float, text: str) -> None:
-    assert si(value, "J") == text
