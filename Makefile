@@ -16,6 +16,9 @@ PACKAGES := python3-venv gcc g++ pkg-config libzmq3-dev nlohmann-json3-dev syste
     strace bash-completion zsh fish mandoc \
     chromium $(if $(shell command -v npm 2>/dev/null),,npm)
 
+# A run starts hundreds of daemons; without bytecode each would compile its source again.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Where `make install` puts the program: a directory of its own, which `make uninstall` removes.
 PREFIX ?= /opt/hapticd
 DESTDIR ?=
