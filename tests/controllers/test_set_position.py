@@ -94,3 +94,15 @@ def test_a_jump_that_cannot_be_paid_for_goes_as_far_as_all_that_is_left() -> Non
     assert set_position.step(state, params, tick) == pytest.approx((2.0 * 1e4 * 50.0 * 1e-8 / 1e-3) ** 0.5)
     assert state.set_position_m == pytest.approx(-1e-3 + (2.0 * 5e-4 / 1e4) ** 0.5)
     assert state.energy_j == 0.0
+
+
+def test_a_new_touch_begins_as_slack_as_the_first_one() -> None:
+    """What the spring held when the device was pulled out of the wall is gone."""
+    state, params = fresh_state(set_position), Params(damping_n_s_per_m=0.0)
+    set_position.start(state, params, LawSnapshot())
+    for x_m in (-1e-3, 1e-3, -3e-3):
+        inside = x_m < 0.0
+        force_n = -1e4 * x_m if inside else 0.0
+        tick = LawTick(x_m=x_m, moved_m=-2e-3, in_contact=inside, contact_n=force_n, spring_n=force_n)
+        assert set_position.step(state, params, tick) == 0.0
+    assert state.set_position_m == -3e-3

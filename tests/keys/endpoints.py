@@ -81,6 +81,7 @@ class Client:
     def __init__(self, context: zmq.Context[Any], kind: int, endpoint: str, keys: Key | None) -> None:
         self.socket = context.socket(kind)
         self.socket.setsockopt(zmq.LINGER, 0)
+        self.socket.setsockopt(zmq.IPV6, 1)
         if keys is not None:
             self.socket.setsockopt(zmq.CURVE_SERVERKEY, keys.server.encode())
             self.socket.setsockopt(zmq.CURVE_PUBLICKEY, keys.public.encode())

@@ -116,6 +116,14 @@ def test_who_says_what_makes_no_sense_is_dropped_in_the_end_and_no_other() -> No
             assert who.bytes
 
 
+def test_of_an_endpoint_that_is_given_up_nothing_is_kept() -> None:
+    """Its port may be bound again, with all its connections to come."""
+    with bounded() as (bound, socket, where), sockets.create_connection(where):
+        wait_until(lambda: any(bound._endpoints.values()), "news of the connection")
+        socket.unbind(socket.getsockopt_string(zmq.LAST_ENDPOINT))
+        wait_until(lambda: not any(bound._endpoints.values()), "news of its end")
+
+
 def test_the_kernel_knows_who_is_at_the_other_end(tmp_path: Path) -> None:
     ours, theirs = sockets.socketpair(sockets.AF_UNIX)
     with ours, theirs:

@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hapticd.errors import ConfigError
-from hapticd.keys.file import Key, KeyWriteError, is_key, new_pair, read, write
+from hapticd.keys.file import Key, KeyWriteError, is_key, new_pair, read, write, written
 from tests.examples import examples
 
 
@@ -74,6 +74,8 @@ def test_a_file_is_never_replaced_unless_that_is_asked_for(tmp_path: Path) -> No
     with pytest.raises(KeyWriteError, match=f"{path}: is there already; --force"):
         write(path, second)
     assert read(path) == first
+    with pytest.raises(KeyWriteError), written(path, second):
+        pytest.fail("what goes with the new key is not done")
     write(path, second, replace=True)
     assert read(path) == second
     assert list(tmp_path.iterdir()) == [path]

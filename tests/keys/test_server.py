@@ -24,7 +24,7 @@ from hapticd.keys.file import Key, new_pair
 from hapticd.supervisor.commands import CommandSocket
 from tests.daemon.running import wait_until
 from tests.examples import examples
-from tests.keys.endpoints import Endpoints, ring_of
+from tests.keys.endpoints import Client, Endpoints, ring_of
 from tests.telemetry.sockets import PATIENCE_S, ticks
 
 SERVER = new_pair()
@@ -247,14 +247,41 @@ def test_whoever_says_nothing_is_disconnected(monkeypatch: pytest.MonkeyPatch) -
                     pass
 
 
-@examples(50)
-@given(st.lists(st.binary(max_size=200), min_size=1, max_size=4))
-def test_whatever_a_listed_client_sends_is_answered(frames: list[bytes]) -> None:
+def test_whatever_a_listed_client_sends_is_answered() -> None:
     with served() as endpoints:
-        commander = endpoints.client(zmq.DEALER, endpoints.control, LAPTOP)
-        commander.socket.send_multipart(frames)
-        endpoints.turn_until(lambda: bool(commander.socket.poll(0)), "an answer")
-        assert set(msgpack.unpackb(commander.socket.recv())) >= {"ok", "text"}
+
+        @examples(50)
+        @given(st.lists(st.binary(max_size=200), min_size=1, max_size=4))
+        def is_answered(frames: list[bytes]) -> None:
+            commander = endpoints.client(zmq.DEALER, endpoints.control, LAPTOP)
+            commander.socket.send_multipart(frames)
+            endpoints.turn_until(lambda: bool(commander.socket.poll(0)), "an answer")
+            assert set(msgpack.unpackb(commander.socket.recv())) >= {"ok", "text"}
+            endpoints.clients.remove(commander)
+            commander.close()
+
+        is_answered()
+
+
+def test_an_address_of_ipv6_takes_keys_as_any_other() -> None:
+    context = zmq.Context()
+    socket = context.socket(zmq.ROUTER)
+    bound = server.CurveServer(socket, "tcp://[::1]:0", SERVER, frozenset({LAPTOP.public}))
+    client = Client(context, zmq.DEALER, bound.endpoint, LAPTOP)
+    try:
+        client.socket.send(ARM)
+
+        def came() -> bool:
+            bound.turn()
+            return bool(socket.poll(0))
+
+        wait_until(came, "a request")
+        assert socket.recv_multipart()[1] == ARM
+    finally:
+        client.close()
+        socket.close(0)
+        bound.close()
+        context.term()
 
 
 class Reluctant(server.CurveServer):

@@ -79,6 +79,8 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "2000000000000.0]",
         "controllers/hapticd_controllers/virtual_coupling.py: : LIMIT = 1000000000000.0  [1000000000000.0 is "
         "2000000000000.0]",
+        "controllers/hapticd_controllers/set_position.py: : LIMIT = 1000000000000.0  [1000000000000.0 is "
+        "2000000000000.0]",
     ),
     "only what is larger than any bound comes so far": (
         "controllers/hapticd_controllers/tdpa.py: _bounded: return LIMIT if value > 0.0 else -LIMIT  [0.0 is 1.0]",
