@@ -8,7 +8,6 @@ import re
 import signal
 import statistics
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,11 +16,11 @@ from hapticd.loop.memory import RECORDS, SharedMemory
 from hapticd.tick.event import EventCode
 from tests.daemon.running import Subscriber, all_records, gone, wait_until
 from tests.daemon.test_deaths import PRESSED, ramped_out
-from tests.service.machine import Machine, booted, eventually, memory_of
+from tests.service.machine import Machine, eventually, memory_of
+from tests.service.unit import CONFIG, Service
 
 pytestmark = pytest.mark.timeout(900)  # the first machine ever has to be made
 
-CONFIG = "/etc/hapticd/hapticd.toml"
 SLOW_LAW = '''
 """A law that takes its time with the very first step."""
 import time
@@ -38,70 +37,6 @@ def step(state, params, tick):
     time.sleep(60.0)
     return tick.contact_n
 '''
-
-
-@pytest.fixture(scope="module")
-def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
-    """A machine with hapticd installed, as `make install` does it."""
-    with booted(tmp_path_factory.mktemp("machine") / "console") as machine:
-        machine.run("make", "-C", "/opt/src", "install")
-        latency = Path("/dev/cpu_dma_latency")
-        if latency.exists():  # a container has no udev to make it and give it to the group
-            major, minor = os.major(latency.stat().st_rdev), os.minor(latency.stat().st_rdev)
-            machine.run("mknod", "--mode=0660", str(latency), "c", str(major), str(minor))
-            machine.run("chgrp", "hapticd", str(latency))
-        yield machine
-
-
-class Service:
-    """A unit of the machine that runs, and what to see and do."""
-
-    def __init__(self, machine: Machine, instance: str = "default", config: str = PRESSED) -> None:
-        self.machine = machine
-        self.unit = "hapticd.service" if instance == "default" else f"hapticd@{instance}.service"
-        self.file = CONFIG if instance == "default" else f"/etc/hapticd/{instance}.toml"
-        self.endpoint = f"ipc://{machine.path(f'/run/hapticd/{instance}/telemetry')}"
-        self.write(config)
-        self._forget_failures()
-        machine.run("systemctl", "start", self.unit)
-        self.supervisor, self.control = machine.processes(self.unit)
-
-    def __enter__(self) -> Service:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.machine.run("systemctl", "stop", self.unit)
-        self._forget_failures()
-
-    def _forget_failures(self) -> None:
-        """Let systemd not count how often tests start the unit."""
-        self.machine.run("systemctl", "reset-failed", "hapticd.service", "hapticd@*.service", check=False)
-
-    def write(self, config: str) -> None:
-        self.machine.path(self.file).write_text(config)
-
-    def show(self, key: str) -> str:
-        return self.machine.show(self.unit, key)
-
-    def pressing(self) -> Service:
-        """Return when the daemon holds a force against the hand."""
-        with Subscriber(self.endpoint, "hapticd/position") as subscriber:
-            for _, fields in subscriber.maps():
-                if fields["seq"] > 300 and abs(fields["force_n"][0]) > 2.0:
-                    return self
-        raise AssertionError("no force")
-
-    def restarted(self) -> None:
-        """Return when systemd has started it again after a failure, and it ticks."""
-        eventually(lambda: self.show("NRestarts") == "1", "the restart", self.machine)
-        eventually(lambda: self.show("ActiveState") == "active", "ticks after the restart", self.machine)
-        assert (self.supervisor, self.control) != self.machine.processes(self.unit)
-
-
-@pytest.fixture
-def service(machine: Machine) -> Iterator[Service]:
-    with Service(machine) as service:
-        yield service.pressing()
 
 
 def ramped_out_since(memory: SharedMemory, since_ns: int) -> bool:
