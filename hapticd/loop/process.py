@@ -46,8 +46,10 @@ def main() -> int:
     parser.add_argument("--socket", type=int, required=True)
     parser.add_argument("--parent", type=int, required=True)
     arguments = parser.parse_args()
-    # The terminal's interrupt goes to every process in the group; the supervisor alone decides what it means.
+    # An interrupt of the terminal and `systemctl kill -s HUP` go to every process; the supervisor alone decides what
+    # they mean.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     channel = socket.socket(fileno=arguments.socket)
     try:
         try:

@@ -192,6 +192,7 @@ def main() -> int:
     # The supervisor alone decides when this ends: at its own end, which takes the force out first.
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     die_with_parent(arguments.parent, signal.SIGKILL)
     channel = socket.socket(fileno=arguments.socket)
     try:

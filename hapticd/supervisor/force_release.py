@@ -107,7 +107,9 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
 
 def main() -> int:
     """Be ready; then open, disable, close."""
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd tells all at once; the supervisor's end is the end of this
+    # systemd tells all at once; the supervisor's end is the end of this.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     parser = argparse.ArgumentParser()
     parser.add_argument("--config", type=int, required=True)
     arguments = parser.parse_args()

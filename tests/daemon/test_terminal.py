@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -43,7 +44,12 @@ def test_the_end_of_its_terminal_is_the_end_of_a_daemon(terminal: Terminal, labo
 
 
 def test_at_a_terminal_too_sighup_from_a_person_is_a_reload(terminal: Terminal) -> None:
-    terminal.process.send_signal(signal.SIGHUP)
+    """Also where each process of the daemon gets one, as `systemctl kill -s HUP` has it."""
+    tasks = Path(f"/proc/{terminal.process.pid}/task").glob("*/children")
+    children = [int(pid) for task in tasks for pid in task.read_text().split()]
+    assert len(children) == 2, "the loop and what takes its force away"
+    for pid in (*children, terminal.process.pid):
+        os.kill(pid, signal.SIGHUP)
     terminal.until("goes on")
     assert command("status")["status"]["armed"]
 
