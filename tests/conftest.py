@@ -72,6 +72,12 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     return repeating.repeated(item, nextitem) if repeating.REPEAT > 1 else None
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say what was repeated."""
+    if repeating.REPEAT > 1:
+        terminalreporter.write_line(repeating.said())
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     report = yield

@@ -19,6 +19,7 @@ REPEAT = int(os.environ.get("REPEAT", "1"))
 _SPIN = "import os; os.sched_setaffinity(0, {{{cpu}}})\nwhile os.getppid() == {parent}: pass"
 
 _started = 0
+_times: dict[str, int] = {}  # how often each test that started a daemon has run
 
 
 def watch_for_daemons() -> None:
@@ -39,6 +40,8 @@ def repeated(item: pytest.Item, next_item: pytest.Item | None) -> bool:
     for number in range(REPEAT):
         before = _started
         reports = runtestprotocol(item, nextitem=next_item, log=False)
+        if _started > before or item.nodeid in _times:
+            _times[item.nodeid] = number + 1
         failed = any(report.failed for report in reports)
         if failed:
             for report in reports:
@@ -49,6 +52,15 @@ def repeated(item: pytest.Item, next_item: pytest.Item | None) -> bool:
             break
     hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+def said() -> str:
+    """What was repeated, in a line; those whose daemon serves a whole file run once or twice."""
+    often = sum(times == REPEAT for times in _times.values())
+    return (
+        f"{len(_times)} tests started a daemon: {often} of them ran {REPEAT} times beside a busy processor, "
+        f"{len(_times) - often} fewer"
+    )
 
 
 @contextlib.contextmanager
