@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from hapticd.config.loading import parse
 from hapticd.device import DeviceInfo, Sample
@@ -22,20 +23,24 @@ WALL = "[[scene.walls]]\nstiffness_n_per_m = 1000.0\n"
 class AtRest(Driver[DriverOptions]):
     """A device that stands still.
 
+    Args:
+        declared: what it says of itself.
+
     Attributes:
         sample: what it says.
         before_read: done at each read.
         refusal: why it lets no forces through, if it does not.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, **declared: Any) -> None:
         super().__init__(DriverOptions(), 1e-3)
+        self._declared = declared
         self.sample = Sample(1)
         self.before_read: Callable[[], None] = lambda: None
         self.refusal: DriverError | None = None
 
     def _open(self) -> DeviceInfo:
-        return device()
+        return device(**self._declared)
 
     def _enable(self) -> None:
         if self.refusal is not None:
@@ -55,18 +60,25 @@ class AtRest(Driver[DriverOptions]):
 class Started:
     """A loop that runs where it is told to.
 
+    Args:
+        clock: its clock.
+        auto_arm: whether it arms by itself.
+        text: its configuration.
+        declared: what its device says of itself.
+
     Attributes:
+        config: the configuration.
         told: the events of the run, once it has ended.
         skipped: deadlines that were missed until then.
     """
 
-    def __init__(self, clock: Clock, auto_arm: bool = True) -> None:
+    def __init__(self, clock: Clock, auto_arm: bool = True, text: str = WALL, **declared: Any) -> None:
         self.clock = clock
-        self.driver = AtRest()
+        self.driver = AtRest(**declared)
         self.shared = SharedMemory(RecordLayout(1, False, 8), 1000.0)
-        config = parse(WALL, "started")
-        self.tick = make_tick(config, self.driver.open())
-        settings = config.config
+        self.config = parse(text, "started")
+        self.tick = make_tick(self.config, self.driver.open())
+        settings = self.config.config
         self.loop = ControlLoop(
             self.driver, self.tick, self.shared, settings.loop, settings.safety, auto_arm, self._sleep_until
         )

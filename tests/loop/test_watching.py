@@ -1,0 +1,144 @@
+"""What the loop does beside its tick: signs of life, its own lateness, what clients say, and what it writes down."""
+
+from __future__ import annotations
+
+import pytest
+
+from hapticd import plugins
+from hapticd.config.loading import parse
+from hapticd.loop.memory import ANSWERED, REQUESTS, SUPERVISOR_BEAT, RecordReader
+from hapticd.loop.remote_slots import SlotWriter
+from hapticd.supervisor.reload import switch_request
+from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.guard import Mode
+from hapticd.tick.record import TickRecord
+from tests.loop.clock import Clock
+from tests.loop.started import WALL, Started
+from tests.loop.test_remote_slots import at
+
+LAW = f"{WALL}[controller]\nlaw = 'none'\n"
+TOOL = '[[scene.couplings]]\nname = "tool"\nstiffness_n_per_m = 100.0\nmax_force_n = 3.0\nhold_s = 0.1\n'
+TOOLS = [("tool", "coupling")]
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    return Clock(monkeypatch)
+
+
+def test_each_tick_is_written_down_with_its_times_and_its_walls(clock: Clock) -> None:
+    """One that wakes 0.25 ms late, one whose read takes 1.3 ms, and nothing of those that are skipped."""
+    started = Started(clock)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    started.driver.sample.position_m[0] = -2e-3
+    reader = RecordReader(started.shared)
+    seen: list[TickRecord] = []
+
+    def each_tick(number: int) -> None:
+        seen.extend(reader.read())
+        clock.pass_s(1.05e-3 if number == 10 else 0.0)
+        started.driver.before_read = lambda: clock.pass_s(1.3e-3 if number == 20 else 0.2e-3)
+
+    started.run(each_tick, 120)
+    assert [record.seq for record in seen] == list(range(len(seen)))
+    first_ns = seen[0].deadline_ns
+    assert first_ns % 1_000_000 == 0
+    assert [record.deadline_ns - first_ns for record in seen[:30]] == [
+        (number + (number > 20)) * 1_000_000 for number in range(30)
+    ]
+    assert [record.skipped for record in seen[:30]] == [int(number > 20) for number in range(30)]
+    late_us = {number: record.late_us for number, record in enumerate(seen) if record.late_us}
+    assert late_us == {10: pytest.approx(250.0)}
+    busy_us = [record.busy_us for record in seen]
+    assert busy_us == [pytest.approx(1300.0 if number == 20 else 200.0) for number in range(len(seen))]
+    assert {len(record.walls) for record in seen} == {1}
+    assert seen[100].position_m == (-2e-3,)
+    assert seen[100].force_n == pytest.approx((2.0,))
+
+
+def told(started: Started, code: EventCode) -> list[LoopEvent]:
+    return [event for event in started.told if event.code == code]
+
+
+def test_a_supervisor_that_shows_no_sign_of_life_is_told_each_time_and_costs_the_force(clock: Clock) -> None:
+    """After the very time that is set for it, and not at the first tick that has waited for so long."""
+    started = Started(clock, text=WALL + "[safety]\nsupervisor_stall_s = 1.0\n")
+    silent = [range(100, 1400), range(1500, 2700)]
+    latched: list[int] = []
+
+    def each_tick(number: int) -> None:
+        if not any(number in span for span in silent):
+            started.shared.words[SUPERVISOR_BEAT] = clock.now_ns
+        if started.tick.guard.latched:
+            latched.append(number)
+        if number == 1450:
+            started.tick.guard.clear()
+            started.loop.session.arm()
+
+    started.run(each_tick, 2900)
+    # The last sign of life came before tick 98, which is a millisecond later.
+    assert latched[0] == 100 + 1000
+    stalled = told(started, EventCode.SUPERVISOR_STALLED)
+    assert [event.text for event in stalled] == ["no sign of the supervisor for 1 s"] * 2
+    assert started.tick.guard.mode is Mode.DISARMED
+    assert started.tick.guard.latched
+
+
+def late(clock: Clock, slow: list[int], auto_arm: bool = True, simulated: bool = False) -> list[LoopEvent]:
+    """Events of a loop whose reads take 10.5 ms at these ticks, so that ten deadlines are missed at each."""
+    started = Started(clock, auto_arm, simulated=simulated)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+
+    def each_tick(number: int) -> None:
+        started.driver.before_read = lambda: clock.pass_s(10.5e-3 if number in slow else 0.0)
+
+    started.run(each_tick, 1200)
+    assert started.skipped == 10 * len(slow)
+    return told(started, EventCode.LOOP_LATE)
+
+
+def test_a_loop_that_misses_fifty_more_deadlines_than_it_meets_lets_go(clock: Clock) -> None:
+    (event,) = late(clock, [1000, 1001, 1002, 1003, 1004])
+    assert event.text == "50 more deadlines were missed than met"
+    assert event.seq == 1005
+    assert late(clock, [1000, 1001, 1002, 1003, 1005]) == []
+    (event,) = late(clock, [1000, 1001, 1002, 1003, 1005, 1007])
+    assert event.text == "58 more deadlines were missed than met"
+
+
+def test_lateness_of_a_simulated_device_or_of_one_that_is_disarmed_takes_no_force_away(clock: Clock) -> None:
+    slow = [*range(1000, 1010)]
+    assert late(clock, slow, simulated=True) == []
+    assert late(clock, slow, auto_arm=False) == []
+    assert late(clock, slow) != []
+
+
+@pytest.mark.parametrize("switched", [False, True], ids=["from the start", "after a switch"])
+def test_what_clients_drive_is_taken_and_told_when_it_is_let_go_and_when_it_is_back(
+    clock: Clock, switched: bool
+) -> None:
+    """Once the scene has it, from whatever time on; a port that has nothing new has no event."""
+    started = Started(clock, text=LAW if switched else LAW + TOOL)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    started.loop.requests.know("none", plugins.law("none"))
+    in_force: list[tuple[int, int]] = []
+
+    def each_tick(number: int) -> None:
+        shared = started.shared
+        if number == 20 and switched:
+            shared.post(switch_request(started.config, parse(LAW + TOOL, "with a tool")))
+        if number in (200, 201, 400):
+            assert shared.words[ANSWERED] == shared.words[REQUESTS]
+            SlotWriter(shared, TOOLS).write(0, at(1e-3, seq=number))
+        if number in (202, 402):
+            in_force.append((number, started.tick.ports[0].seq))
+
+    started.run(each_tick, 450)
+    assert in_force == [(202, 201), (402, 400)]
+    stale, back = (told(started, code) for code in (EventCode.REMOTE_STALE, EventCode.REMOTE_BACK))
+    assert [event.fields for event in stale] == [{"name": "tool"}]
+    assert [event.fields for event in back] == [{"name": "tool"}]
+    assert "its client is silent" in stale[0].text
+    assert back[0].text == "tool: in force again"
+    assert 201 + 100 <= stale[0].seq <= 201 + 102
+    assert 400 <= back[0].seq <= 401
