@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
 import pytest
 from hypothesis import Phase, settings
+
+from tests.mutation.reach import Follower, Line, Reach, file_of
 
 SHORTEST_LIMIT_S = 20.0
 """Shortest time limit of one test [s]; else twenty times what it takes without a slip, and five times its file: the
@@ -21,10 +24,12 @@ class Told:
     Attributes:
         took_s: how long each test took, with what it sets up [s].
         failed: those that failed.
+        reach: what they came by, where they were followed.
     """
 
     took_s: dict[str, float]
     failed: list[str]
+    reach: Reach | None = None
 
 
 @dataclass(slots=True)
@@ -34,23 +39,35 @@ class Experience:
     Attributes:
         took_s: how long each takes without a slip [s].
         noticed: how many slips each has noticed.
+        reach: what they come by.
     """
 
     took_s: dict[str, float] = field(default_factory=dict)
     noticed: Counter[str] = field(default_factory=Counter)
+    reach: Reach = field(default_factory=Reach)
 
-    def order(self) -> list[str]:
-        """The tests: first those that notice most in the shortest time, then file by file, the quickest first."""
-        files = self.files_s()
-        noticing = sorted(self.noticed, key=lambda name: -self.noticed[name] / (0.05 + self.took_s.get(name, 0.0)))
-        others = sorted(self.took_s, key=lambda name: (files[_file(name)], _file(name), self.took_s[name]))
-        return [*noticing, *(name for name in others if name not in self.noticed)]
+    def order(self, lines: Collection[Line] = ()) -> list[str]:
+        """The tests that can notice a slip: first those that come by it, in the shortest time, then the others.
+
+        Args:
+            lines: of the slip; none: whatever is known of no line.
+        """
+        near = self.reach.tests(lines)
+        files = self.reach.files(lines) if self.reach.lines else {file_of(name) for name in self.took_s}
+        files_s = self.files_s()
+
+        def place(name: str) -> tuple[bool, float, float, str, float]:
+            took_s = self.took_s[name]
+            worth = self.noticed[name] / (0.05 + took_s)
+            return name not in near, -worth, files_s[file_of(name)], file_of(name), took_s
+
+        return sorted((name for name in self.took_s if file_of(name) in files), key=place)
 
     def files_s(self) -> dict[str, float]:
         """How long the tests of each file take [s]."""
         files: defaultdict[str, float] = defaultdict(float)
         for name, took_s in self.took_s.items():
-            files[_file(name)] += took_s
+            files[file_of(name)] += took_s
         return files
 
 
@@ -61,18 +78,20 @@ class InOrder:
 
     Args:
         experience: of the room's tests.
+        order: the names of those that are to run; none: all, as they come.
+        follower: notes what they come by, if that is asked.
         to: where it is told, at the end.
     """
 
-    def __init__(self, experience: Experience, to: Connection) -> None:
-        self._place = {name: place for place, name in enumerate(experience.order())}
+    def __init__(self, experience: Experience, order: Sequence[str], follower: Follower | None, to: Connection) -> None:
+        self._place = {name: place for place, name in enumerate(order)}
         files = experience.files_s()
         self._limits_s = {
-            name: max(SHORTEST_LIMIT_S, 20.0 * took_s + 5.0 * files[_file(name)])
+            name: max(SHORTEST_LIMIT_S, 20.0 * took_s + 5.0 * files[file_of(name)])
             for name, took_s in experience.took_s.items()
         }
         self._to = to
-        self._told = Told({}, [])
+        self._told = Told({}, [], follower.reach if follower else None)
 
     @pytest.hookimpl(trylast=True)
     def pytest_configure(self) -> None:
@@ -83,8 +102,11 @@ class InOrder:
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """In order; what is not known stays at the end, as it is."""
-        items.sort(key=lambda item: self._place.get(item.nodeid, len(self._place)))
+        """In order, and no others."""
+        if self._place:
+            items[:] = sorted(
+                (item for item in items if item.nodeid in self._place), key=lambda item: self._place[item.nodeid]
+            )
         for item in items:
             if item.nodeid in self._limits_s:
                 item.add_marker(pytest.mark.timeout(self._limits_s[item.nodeid]), append=False)
@@ -98,7 +120,3 @@ class InOrder:
     def pytest_sessionfinish(self) -> None:
         """Tell."""
         self._to.send(self._told)
-
-
-def _file(name: str) -> str:
-    return name.split("::")[0]

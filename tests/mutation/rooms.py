@@ -31,6 +31,11 @@ class Room:
     tests: tuple[str, ...]
     select: str = ""
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The same as arguments of pytest."""
+        return (*self.tests, *(("-k", self.select) if self.select else ()))
+
 
 def _law(name: str) -> Room:
     own = () if name == "none" else (f"tests/controllers/test_{name}.py",)

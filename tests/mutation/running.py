@@ -31,6 +31,7 @@ import pytest
 
 from tests.mutation.harmless import HARMLESS
 from tests.mutation.order import Experience, InOrder, Told
+from tests.mutation.reach import Follower, Reach, file_of
 from tests.mutation.rooms import ROOMS, Room
 from tests.mutation.slips import Slip, slips
 
@@ -38,12 +39,32 @@ ROOT = Path(__file__).parents[2]
 SOURCES = ("hapticd", "drivers", "controllers", "studies", "benchmarks", "views")
 COPIED = (*SOURCES, "tests", "config", "docs", "systemd", "pyproject.toml", "README.md", "CHANGELOG.md", "Makefile")
 PARALLEL = 2
+LIKELIEST = 30
+"""So many tests run before the others are read."""
+
 LEAST_S = 60.0
 """Shortest time limit of a run [s]; a run that takes longer than five times that of the tree as it is has noticed."""
 
 _PRELOADED = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
 _FORKS = multiprocessing.get_context("forkserver")  # what takes long to import, and is in no tree, is imported once
 _FORKS.set_forkserver_preload(["pytest", "hypothesis", "numpy", "numba", "pydantic", "tomlkit", "msgpack", "zmq"])
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a process does that runs tests.
+
+    Attributes:
+        arguments: of pytest.
+        known: of the tests.
+        order: those that are to run; none: all.
+        follow: files whose lines are noted, test by test.
+    """
+
+    arguments: tuple[str, ...]
+    known: Experience
+    order: Sequence[str] = ()
+    follow: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,9 +121,9 @@ def judge(
     known = Experience()
     with tempfile.TemporaryDirectory(prefix="mutation-") as place:
         tree = _copy(Path(place) / "0")
-        known.took_s = _without_slip(tree, room, known, os.environ.get("PYTHONDONTWRITEBYTECODE", ""))
+        known.reach = _followed(tree, room, known)
         started_s = time.monotonic()
-        _without_slip(tree, room, known, "1")  # a test that fails in another order would find every slip
+        known.took_s = _without_slip(tree, room, known)
         limit_s = max(LEAST_S, 5.0 * (time.monotonic() - started_s))
         free: SimpleQueue[Path] = SimpleQueue()
         free.put(tree)
@@ -115,9 +136,7 @@ def judge(
             source, stamp = file.read_text(), file.stat()
             try:
                 file.write_text(slip.into(source))
-                told = _run(mine, room, known, "1", limit_s)
-                lives = told is not None and not told.failed
-                known.noticed.update(told.failed[:1] if told else ())
+                lives = _lives(mine, known, known.order({(slip.file, line) for line in slip.lines(source)}), limit_s)
                 progress(slip, lives)
                 return lives
             finally:
@@ -147,22 +166,38 @@ def _copy(to: Path) -> Path:
     return to
 
 
-def _without_slip(tree: Path, room: Room, known: Experience, no_bytecode: str) -> dict[str, float]:
-    """How long each test takes on the tree as it is [s]."""
-    told = _run(tree, room, known, no_bytecode, 3600.0)
+def _followed(tree: Path, room: Room, known: Experience) -> Reach:
+    """What the tests of a room come by; to be followed makes them slow, so what they find is not asked."""
+    told = _run(tree, Task(room.asked, known, follow=room.files), 3600.0)
+    if told is None or told.reach is None or not told.reach.lines:
+        raise RuntimeError(f"cannot be followed: {' '.join(room.tests)}")
+    return told.reach
+
+
+def _without_slip(tree: Path, room: Room, known: Experience) -> dict[str, float]:
+    """How long each test takes on the tree as it is, in the order in which they run on one that has a slip [s]."""
+    told = _run(tree, Task((*room.asked, "-x"), known, known.order()), 3600.0)
     if told is None or told.failed or not told.took_s:
         failed = " ".join(told.failed if told else room.tests)
         raise RuntimeError(f"fails without any slip: {failed}")
     return told.took_s
 
 
-def _run(tree: Path, room: Room, known: Experience, no_bytecode: str, limit_s: float) -> Told | None:
-    """Run a room's tests on a tree until one fails; None where that ended early or took longer than the limit."""
-    arguments = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-W", _PRELOADED, *room.tests]
-    if room.select:
-        arguments += ["-k", room.select]
+def _lives(tree: Path, known: Experience, order: Sequence[str], limit_s: float) -> bool:
+    """Whether no test notices; those that are likeliest to run alone, since reading all the others takes its time."""
+    for names in (order[:LIKELIEST], order[LIKELIEST:]):
+        if names:
+            told = _run(tree, Task(("-x", *dict.fromkeys(map(file_of, names))), known, names), limit_s)
+            known.noticed.update(told.failed[:1] if told else ())
+            if told is None or told.failed:
+                return False
+    return True
+
+
+def _run(tree: Path, task: Task, limit_s: float) -> Told | None:
+    """Run tests on a tree; None where that ended early or took longer than the limit."""
     hearing, telling = _FORKS.Pipe(duplex=False)
-    running = _FORKS.Process(target=_run_tests, args=(tree, arguments, known, no_bytecode, telling))
+    running = _FORKS.Process(target=_run_tests, args=(tree, task, telling))
     running.start()
     telling.close()
     with hearing, contextlib.suppress(EOFError):
@@ -177,20 +212,28 @@ def _run(tree: Path, room: Room, known: Experience, no_bytecode: str, limit_s: f
     return None
 
 
-def _run_tests(tree: Path, arguments: Sequence[str], known: Experience, no_bytecode: str, telling: Connection) -> None:
+def _run_tests(tree: Path, task: Task, telling: Connection) -> None:
     """What a process does that was forked for it: nothing of the tree has been imported yet."""
     os.setsid()
     os.chdir(tree)
     paths = [str(tree / source) for source in ("", *SOURCES[1:])]
     sys.path[:0] = paths
-    os.environ |= {"PYTHONPATH": os.pathsep.join(paths), "PYTHONDONTWRITEBYTECODE": no_bytecode, "CI": "false"}
-    sys.dont_write_bytecode = bool(no_bytecode)
+    no_bytecode = not task.follow  # what is on the tree as it is stays good for those with a slip
+    os.environ |= {
+        "PYTHONPATH": os.pathsep.join(paths),
+        "PYTHONDONTWRITEBYTECODE": "1" if no_bytecode else "",
+        "CI": "false",
+    }
+    sys.dont_write_bytecode = no_bytecode
     with Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
     loaded = [name for name in sys.modules if name.startswith("hapticd")]
     assert not loaded, loaded
-    os._exit(pytest.main(list(arguments), [InOrder(known, telling)]))
+    follower = Follower(tree, task.follow) if task.follow else None
+    plugins = [InOrder(task.known, task.order, follower, telling), *([follower] if follower else [])]
+    arguments = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-W", _PRELOADED, *task.arguments)
+    os._exit(pytest.main(list(arguments), plugins))
 
 
 def _tell(slip: Slip, lives: bool) -> None:

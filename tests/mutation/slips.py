@@ -39,6 +39,18 @@ class Slip:
         self.change(next(node for index, node in enumerate(ast.walk(tree)) if index == self.at))
         return ast.unparse(tree) + "\n"
 
+    def lines(self, source: str) -> set[int]:
+        """The lines that a test comes by if it comes by the slip; none for a number of the module."""
+        if not self.where:
+            return set()
+        tree = ast.parse(source)
+        nodes = list(ast.walk(tree))
+        node = nodes[self.at]
+        self.change(node)
+        gone = [each for each in set(nodes) - set(ast.walk(tree)) if isinstance(each, ast.stmt)]
+        within = [each for each in nodes if isinstance(each, ast.stmt) and node in ast.walk(each)]
+        return {line for each in gone or within[-1:] for line in _own_lines(each)}
+
     def diff(self, source: str) -> str:
         """What it changes, as `diff -u` shows it."""
         before, after = ast.unparse(ast.parse(source)) + "\n", self.into(source)
@@ -65,6 +77,13 @@ def slips(root: Path, file: str) -> list[Slip]:
         for label, change in list(_numbers(node)) or changes(node, (), homes):
             found.append(Slip(file, where, f"{home}  [{label}]", at, change))
     return found
+
+
+def _own_lines(statement: ast.stmt) -> range:
+    """Its lines, without those of what is in its blocks."""
+    body = getattr(statement, "body", None)
+    last = body[0].lineno - 1 if body else statement.end_lineno
+    return range(statement.lineno, max(statement.lineno, last or 0) + 1)
 
 
 def _is_order_of_equals(node: ast.AST) -> bool:
