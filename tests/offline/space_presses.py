@@ -6,6 +6,8 @@ import math
 import random
 
 KINDS = ("ball", "edge", "plane")
+STIFFNESSES = (12e3, 18e3, 20e3)
+STARTS = 60
 STILL_M = 5e-5
 
 
@@ -41,8 +43,8 @@ def scene(kind: str, seed: int) -> tuple[str, list[float], list[float]]:
     return f'shape = "plane"\norientation = {turn}\n{friction}', [0.0] * 3, [a / math.hypot(*d) for a in d]
 
 
-def press_text(kind: str, stiffness: float, law: str, seed: int) -> str:
-    """The configuration of a press from a start of its own."""
+def press_text(kind: str, stiffness: float, law: str | None, seed: int) -> str:
+    """The configuration of a press from a start of its own; without a law it is the default one."""
     what, at, d = scene(kind, seed)
     draw = random.Random(seed + 10_000)
     newton = draw.choice([1.0, 3.0, 6.0])
@@ -63,7 +65,7 @@ def press_text(kind: str, stiffness: float, law: str, seed: int) -> str:
         name = "{kind}"
         stiffness_n_per_m = {stiffness}
         {what}
-        [controller]
-        law = "{law}"
     """
+    if law is not None:
+        text += f'[controller]\nlaw = "{law}"\n'
     return text.replace("\n        ", "\n")

@@ -1,0 +1,56 @@
+"""Presses in three axes by a running daemon, judged from its telemetry: steady with the default law.
+
+A ball, the edge of a box and a plane with friction at 12, 18 and 20 kN/m, from sixty starts and directions each. The
+same presses without a law move on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from tests.daemon.presses import AWAY, PRESS, scene_text
+from tests.daemon.running import Daemon, Subscriber
+from tests.offline.space_presses import KINDS, STARTS, STIFFNESSES, STILL_M
+
+JUDGED = 500
+"""Ticks at the end of a press in which it must be still."""
+TOP = Path(__file__).parents[2]
+
+
+def spans_m(stiffness: float, law: str | None, kinds: Sequence[str], starts: int) -> list[float]:
+    """How far the device moves in the last half second of each press, as the daemon's telemetry has it."""
+    presses = starts * len(kinds)
+    seen: list[list[list[float]]] = [[] for _ in range(presses)]
+    with (
+        Daemon(scene_text(stiffness, law, kinds, starts), pythonpath=TOP) as daemon,
+        Subscriber(daemon.endpoint, "hapticd/position") as subscriber,
+    ):
+        for _, fields in subscriber.maps():
+            press, tick = divmod(fields["seq"], PRESS + AWAY)
+            if press >= presses:
+                break
+            if PRESS - JUDGED <= tick < PRESS:
+                seen[press].append(fields["position_m"])
+    assert all(len(one) == JUDGED for one in seen)
+    return [math.hypot(*(max(axis) - min(axis) for axis in zip(*one, strict=True))) for one in seen]
+
+
+@pytest.mark.parametrize("law", [None, "none"])
+def test_the_default_law_steadies_the_ball_the_edge_and_the_plane(law: str | None) -> None:
+    """At 20 kN/m; the same presses without a law move on."""
+    spans = spans_m(20e3, law, KINDS, 1)
+    assert [span < STILL_M for span in spans] == [law is None] * len(KINDS), spans
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("law", [None, "none"])
+@pytest.mark.parametrize("stiffness", STIFFNESSES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_from_sixty_starts_and_directions(kind: str, stiffness: float, law: str | None) -> None:
+    spans = spans_m(stiffness, law, [kind], STARTS)
+    assert [span < STILL_M for span in spans] == [law is None] * STARTS, spans
