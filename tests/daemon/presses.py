@@ -84,7 +84,8 @@ def scene_text(stiffness: float, law: str | None, kinds: Sequence[str], starts: 
         "edge": 'shape = "box"\nsize_m = [0.04, 0.06, 0.04]\n',
         "plane": 'shape = "plane"\nstatic_friction = 0.8\ndynamic_friction = 0.6\n',
     }
-    text = f"""[device]
+    text = f"""telemetry.send_high_water = 100000
+[device]
 driver = "tests.daemon.presses.Presses"
 [device.options]
 model = "omega7"

@@ -245,20 +245,33 @@ class SolidContact:
         for channel in self.channels:
             channel.hold(periods)
 
-    def add(self, force_n: list[float], requested_n: list[float]) -> None:
-        """Add what is asked for to the sums over all contacts, one element an axis [N]."""
+    def add(self, force_n: list[float]) -> bool:
+        """Add what it applies to the sums over all contacts, one element an axis [N].
+
+        Returns:
+            Whether a blend is under way, so that its laws asked for something else.
+        """
+        blending = False
+        x, y, z = force_n
         for channel in self.channels:
             newton = channel.force_n
-            dx = channel.dx
-            dy = channel.dy
-            dz = channel.dz
-            force_n[0] += dx * newton
-            force_n[1] += dy * newton
-            force_n[2] += dz * newton
+            x += channel.dx * newton
+            y += channel.dy * newton
+            z += channel.dz * newton
+            if channel.blending:
+                blending = True
+        force_n[0] = x
+        force_n[1] = y
+        force_n[2] = z
+        return blending
+
+    def add_requested(self, requested_n: list[float]) -> None:
+        """Add what its laws asked for."""
+        for channel in self.channels:
             newton = channel.requested_n
-            requested_n[0] += dx * newton
-            requested_n[1] += dy * newton
-            requested_n[2] += dz * newton
+            requested_n[0] += channel.dx * newton
+            requested_n[1] += channel.dy * newton
+            requested_n[2] += channel.dz * newton
 
     def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
         """Enter the tick into the books and remember what is applied from now on.
@@ -306,15 +319,13 @@ class SolidContact:
         """The same with friction: each channel holds its part of the vector, along its own direction."""
         solid = self.solid
         proxy = solid.proxy
-        normal = self.normal
+        normal, first, second = channels = self.channels
         depth_m = self.depth_m
         stiffness_n_per_m = gain * solid.stiffness_n_per_m
         stretch_m = self._stretch_m() if depth_m > 0.0 else 0.0
         if dt_s > 0.0:
-            spring_j = taken_j = 0.0
-            for channel in self.channels:
-                taken_j -= channel.applied_n * channel.way_m
-                spring_j -= channel.held_n * channel.way_m
+            taken_j = -normal.applied_n * normal.way_m - first.applied_n * first.way_m - second.applied_n * second.way_m
+            spring_j = -normal.held_n * normal.way_m - first.held_n * first.way_m - second.held_n * second.way_m
             lost_j = stiffness_n_per_m * proxy.lost_m2
             ledger = self.ledger
             stored_j = gain * solid.stored_j(stretch_m, limit_n)
@@ -327,7 +338,7 @@ class SolidContact:
         held = gain
         if solid.stiffness_n_per_m * stretch_m > limit_n:
             held *= limit_n / (solid.stiffness_n_per_m * stretch_m)
-        for channel in self.channels:
+        for channel in channels:
             channel.apply(share)
             channel.held_n = held * channel.wall.spring_n
         if depth_m == 0.0:

@@ -247,8 +247,15 @@ class SpaceTick(ControlTick):
             wall = contact.wall
             force_n[wall.axis] += wall.outward * contact.force_n
             requested_n[wall.axis] += wall.outward * contact.requested_n
+        same = force_n == requested_n
         for solid in held:
-            solid.add(force_n, requested_n)
+            if solid.add(force_n):
+                same = False
+        if same:
+            requested_n[:] = force_n
+        else:
+            for solid in held:
+                solid.add_requested(requested_n)
         share = guard.reduce(force_n, passed_s)
         gain = guard.gain
         limit_n = guard.limit_n
