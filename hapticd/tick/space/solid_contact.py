@@ -202,9 +202,7 @@ class SolidContact:
         wx, wy, wz = way
         if not normal.in_contact:  # the way to the surface counts along its normal
             self.quiet = False
-            normal.dx = nx
-            normal.dy = ny
-            normal.dz = nz
+            normal.dx, normal.dy, normal.dz = nx, ny, nz
         self._moved_m = moved_m = normal.dx * wx + normal.dy * wy + normal.dz * wz
         normal.dx = nx
         normal.dy = ny
@@ -260,9 +258,7 @@ class SolidContact:
             z += channel.dz * newton
             if channel.blending:
                 blending = True
-        force_n[0] = x
-        force_n[1] = y
-        force_n[2] = z
+        force_n[:] = x, y, z
         return blending
 
     def add_requested(self, requested_n: list[float]) -> None:
