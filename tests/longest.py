@@ -15,7 +15,6 @@ LONGEST = (
     "tests/keys/test_server.py",
     "tests/daemon/test_verdicts.py",
     "tests/views/dashboard/test_page.py",
-    "tests/loop/test_warm_up.py",
     "tests/views/test_report.py",
     "tests/drivers/odrive/test_daemon.py",
     "tests/drivers/moteus/test_daemon.py",

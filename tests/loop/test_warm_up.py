@@ -14,11 +14,22 @@ from hapticd.tick.guard import Guard, Mode
 from hapticd.tick.tick import ControlTick
 from tests.tick.rig import device, law, running, scene, wall
 
+RATES_HZ = (100.0, 1000.0, 4000.0, 8000.0)
+KINDS: tuple[dict[str, Any], ...] = ({"has_clock": True}, {"has_sequence": True}, {})
+SPEEDS_M_PER_S = (0.05, 2.0, math.inf)
+WORKSPACES_M = ((-0.1, 0.1), (-math.inf, math.inf), (0.02, 0.3))
 
-@pytest.mark.parametrize("rate_hz", [100.0, 1000.0, 4000.0, 8000.0])
-@pytest.mark.parametrize("kind", [{"has_clock": True}, {"has_sequence": True}, {}], ids=str)
-@pytest.mark.parametrize("max_speed_m_per_s", [0.05, 2.0, math.inf])
-@pytest.mark.parametrize("workspace_m", [(-0.1, 0.1), (-math.inf, math.inf), (0.02, 0.3)])
+
+def every_rate_with_each_of_the_rest() -> list[tuple[float, dict[str, Any], float, tuple[float, float]]]:
+    """A Latin square a rate: each rate meets each kind, speed and workspace; 12 of the 108 combinations."""
+    return [
+        (rate_hz, KINDS[j], SPEEDS_M_PER_S[(i + j) % 3], WORKSPACES_M[(i + 2 * j) % 3])
+        for i, rate_hz in enumerate(RATES_HZ)
+        for j in range(3)
+    ]
+
+
+@pytest.mark.parametrize(("rate_hz", "kind", "max_speed_m_per_s", "workspace_m"), every_rate_with_each_of_the_rest())
 def test_it_is_armed_and_without_fault_to_its_end(
     rate_hz: float, kind: dict[str, Any], max_speed_m_per_s: float, workspace_m: tuple[float, float]
 ) -> None:
