@@ -29,6 +29,10 @@ app = lazy_group(
             f"{_COMMANDS}.batch:batch",
             "Measure the offline simulator next to the same computation in C.",
         ),
+        "device": (
+            f"{_COMMANDS}.device:device",
+            "Measure what a tick costs on the configured device, next to the simulated one.",
+        ),
         "rig": (
             f"{_COMMANDS}.rig:rig",
             "Measure what the serial rig's driver costs over a pseudo-terminal, next to a bare os.write and os.read.",

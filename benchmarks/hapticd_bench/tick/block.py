@@ -15,8 +15,9 @@ from hapticd.config.loading import LoadedConfig
 from hapticd.config.walls import MAX_WALLS
 from hapticd.errors import HapticdError
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory
+from hapticd.loop.memory import SUPERVISOR_BEAT, EventReader, SharedMemory
 from hapticd.tick.assemble import make_tick, place_device
+from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
 from hapticd_bench.tick.case import RATE_HZ
 
@@ -62,8 +63,21 @@ def run_loop(
     spent: array[int],
     sleep_until: Callable[[int], int] | None,
     pieces: dict[str, list[int]],
-) -> None:
-    """Run the real loop on the configuration's device until `spent` is full."""
+) -> str:
+    """Run the real loop on the configuration's device until `spent` is full.
+
+    Args:
+        config: what runs; the device is armed.
+        spent: what each tick takes, from the start [ns].
+        sleep_until: the real sleep; None lets ticks run back to back.
+        pieces: by the names of the calls to time, where they are to be timed; each gets its times [ns].
+
+    Returns:
+        Why the device stayed disarmed; empty when it was armed.
+
+    Raises:
+        HapticdError: the device cannot be used, or the loop stopped by a fault.
+    """
     settings = config.config
     driver = config.driver(config.options, settings.loop.period_s)
     place_device(config, driver)
@@ -88,6 +102,7 @@ def run_loop(
             del pieces["read"][0]  # where the loop found the device, before its first tick
         if tick.guard.latched:
             raise HapticdError(tick.fault_text or "stopped by a fault")
+        return next((event.text for event in EventReader(shared).read() if event.code == EventCode.DISARMED), "")
     finally:
         driver.close()
         shared.close()

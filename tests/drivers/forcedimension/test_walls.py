@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from hapticd.config.loading import parse
+from hapticd.config.plugin_tables import ControllerConfig
 from hapticd.config.walls import MAX_WALLS
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import EventReader, RecordReader, SharedMemory
@@ -17,7 +18,9 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
 from tests.drivers.device_time import DeviceTime
 from tests.drivers.forcedimension.bench import LEFT, RIGHT, Bench
-from tests.drivers.forcedimension.lab import AXES, Rest, config, press, rest_of
+from tests.drivers.forcedimension.lab import AXES, PRESS_N, Rest, config, press, rest_of
+
+FALCON = 60
 
 
 def run(
@@ -76,8 +79,14 @@ def test_the_wall_stands_on_whichever_axis_the_configuration_picks(
     assert rest.held(20000.0), rest
 
 
-def test_without_a_law_the_same_wall_oscillates(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    """So that holding it means something."""
+@pytest.mark.parametrize(("device_type", "resolution_m"), [(RIGHT, 1e-5), (FALCON, 6e-5)])
+def test_the_default_law_holds_a_wall_that_oscillates_without_one(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, device_type: int, resolution_m: float
+) -> None:
+    bench.set(type=device_type, resolution_m=resolution_m, motor_n=8.0)
+    rest = run(bench, monkeypatch, 12000.0, ControllerConfig().law, 1000.0, 0.003)
+    assert rest.peak_to_peak_m < 4.5 * resolution_m
+    assert rest.depth_m == pytest.approx(PRESS_N / 12000.0, abs=resolution_m)
     assert run(bench, monkeypatch, 12000.0, "none", 1000.0, 0.003).peak_to_peak_m > 5e-4
 
 

@@ -11,6 +11,8 @@ from typing import Any, Self
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import Server, ServerConnection, serve
 
+from tests.drivers.urgent import be_urgent
+
 TICK_S = 0.001
 STEP_S = 50e-6
 
@@ -97,6 +99,7 @@ class FakeService:
 
     def _talk(self, client: ServerConnection) -> None:
         self._clients.append(client)
+        be_urgent()
         try:
             with self.lock:
                 first = self._said(first=True)

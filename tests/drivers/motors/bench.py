@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -13,6 +11,7 @@ from typing import Any, Literal, Self
 from hapticd.driver import Driver
 from tests.drivers.motors.shaft import Shaft
 from tests.drivers.motors.wire import Frames, SocketEnd, TtyEnd
+from tests.drivers.urgent import be_urgent
 
 TICK_S = 0.001
 PATIENCE_S = 3.0
@@ -120,8 +119,7 @@ class Bench:
             assert time.monotonic() < end_s
 
     def _serve(self) -> None:
-        with contextlib.suppress(OSError):  # as a controller, it does not wait for others; where this user may
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+        be_urgent()
         while self._running:
             frames = self.end.receive(0.0005 if self._pace == "real" else 0.001)
             with self.lock:

@@ -20,6 +20,7 @@ from typing import Literal
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.frames import FrameReader, framed
 from hapticd_drivers.rig.serial_rig import SerialRig
+from tests.drivers.urgent import be_urgent
 
 FIRMWARE = Path(__file__).parents[3] / "drivers" / "firmware"
 COUNT_M = 7669904e-12
@@ -215,6 +216,7 @@ class Rig:
 
     def _serve(self, master: int) -> None:
         buffer = ctypes.create_string_buffer(_SIZE)
+        be_urgent()
         while self._fds is not None:
             select.select([master], [], [], 0.0005 if self._pace == "real" else 0.02)
             with self.lock, contextlib.suppress(BlockingIOError):

@@ -28,7 +28,8 @@ ATTEMPTS = 5
 it looks lost: that tells nothing of the driver."""
 
 
-def config(board: Board, homing: str) -> str:
+def config(board: Board, homing: str, law: str = "") -> str:
+    """The file of a lab; no law is the default one."""
     return f"""
         [loop]
         law_budget = 1.0
@@ -43,6 +44,7 @@ def config(board: Board, homing: str) -> str:
         [[scene.walls]]
         position_m = {WALL_M}
         stiffness_n_per_m = {STIFFNESS_N_PER_M}
+        {f'[controller]{chr(10)}law = "{law}"' if law else ""}
     """
 
 
@@ -52,12 +54,13 @@ class Lab:
     Args:
         board: the rig; a hand holds its handle at `HELD_M`.
         homing: how it is calibrated; for "here", positions count from there.
+        law: of the wall; "" leaves the default.
     """
 
-    def __init__(self, board: Board, homing: str = "here") -> None:
+    def __init__(self, board: Board, homing: str = "here", law: str = "") -> None:
         self.board = board
         self.zero_m = HELD_M if homing == "here" else 0.0
-        self.daemon = Daemon(config(board, homing))
+        self.daemon = Daemon(config(board, homing, law))
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.DEALER)
 

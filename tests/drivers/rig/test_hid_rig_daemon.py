@@ -17,6 +17,8 @@ import pytest
 from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.daemon.test_commands import ask
+from tests.drivers.resting import DisturbedError, Rest, calmest
+from tests.drivers.rig.device import COUNT_M
 from tests.drivers.rig.hid_bench import SERIAL, HidDouble, build
 
 STIFFNESS_N_PER_M = 500.0
@@ -34,7 +36,11 @@ PRESS_S = 10.0
 BUSY = {EventCode.LOOP_LATE, EventCode.DEVICE_FROZEN, EventCode.DEVICE_LOST}
 """What this computer brings about when it has no time for the loop or for the rig's double."""
 
-CONFIG = f"""
+STIFF_N_PER_M = 12000.0
+STILL_M = 4.5 * COUNT_M
+STIFF_TICKS = 3000
+
+CONFIG = """
 [loop]
 rate_hz = 1000.0
 law_budget = 1.0
@@ -45,9 +51,8 @@ sign_checked = true
 [[scene.walls]]
 axis = "x"
 free_side = "positive"
-stiffness_n_per_m = {STIFFNESS_N_PER_M}
-[controller]
-law = "energy-cycle"
+stiffness_n_per_m = {stiffness_n_per_m}
+{law}
 [safety]
 auto_arm = true
 """
@@ -68,9 +73,15 @@ def double(program: Path) -> Iterator[HidDouble]:
 
 @pytest.fixture
 def daemon(double: HidDouble) -> Iterator[Daemon]:
-    environment = [f"{name}={value}" for name, value in double.environment.items()]
-    with Daemon(CONFIG, prefix=["env", *environment]) as running:
+    with started(double, STIFFNESS_N_PER_M) as running:
         yield running.wait_ready()
+
+
+def started(double: HidDouble, stiffness_n_per_m: float, law: str = "") -> Daemon:
+    """A daemon that sees the double; no law is the default one."""
+    environment = [f"{name}={value}" for name, value in double.environment.items()]
+    text = CONFIG.format(stiffness_n_per_m=stiffness_n_per_m, law=f'[controller]\nlaw = "{law}"' if law else "")
+    return Daemon(text, prefix=["env", *environment])
 
 
 def press(double: HidDouble, daemon: Daemon) -> None:
@@ -126,6 +137,35 @@ def test_a_wall_holds_the_hand_and_the_rig_agrees_where(double: HidDouble, daemo
         assert set(faults) <= BUSY, f"{min(held)} to {max(held)} m: {daemon.output()}"
         let_go_and_arm(double, daemon)
     raise AssertionError(f"the wall did not hold: {min(held)} to {max(held)} m: {daemon.output()}")
+
+
+@pytest.mark.parametrize(("law", "still"), [("", True), ("none", False)])
+def test_the_default_law_holds_a_stiff_wall_that_shakes_without_one(double: HidDouble, law: str, still: bool) -> None:
+    rest = calmest_pressed(double, law, still)
+    if still:
+        assert rest.swing_m < STILL_M
+        assert rest.mean_m == pytest.approx(-PRESS_N / STIFF_N_PER_M, abs=5e-5)
+    else:
+        assert rest.swing_m > 1e-3
+
+
+def calmest_pressed(double: HidDouble, law: str, still: bool) -> Rest:
+    """The calmest half second of a handle that a hand presses into the wall; anew where the loop was disturbed."""
+    said = []
+    for _ in range(ATTEMPTS):
+        double.set("hand_n", 0.0)
+        double.set("x_m", START_M)
+        with started(double, STIFF_N_PER_M, law) as daemon:
+            try:
+                press(double, daemon.wait_ready())
+                rest = calmest(daemon.endpoint, STIFF_TICKS, STILL_M)
+            except (DisturbedError, AssertionError) as disturbed:
+                said.append(str(disturbed))
+                continue
+        if not still or rest.swing_m < STILL_M:
+            return rest
+        said.append(f"swings by {rest.swing_m} m")
+    raise AssertionError(said)
 
 
 def test_a_write_that_stalls_costs_the_loop_no_tick_and_the_rig_its_force(double: HidDouble, daemon: Daemon) -> None:

@@ -14,6 +14,7 @@
 #define _GNU_SOURCE
 #include <math.h>
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -218,6 +219,9 @@ int main(int argc, char **argv)
         return 2;
     }
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (pace != STEPS) { /* a board has a processor of its own; where this user may */
+        sched_setscheduler(0, SCHED_FIFO, &(struct sched_param){.sched_priority = 1});
+    }
     handle = wiring->handle;
     processor = processor_new(argv[2], wiring, &handle);
     port = argv[4];

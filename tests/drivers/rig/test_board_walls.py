@@ -1,4 +1,4 @@
-"""Walls on the Hapkit's firmware in the daemon's own loop, in the rig's time: a tick is a millisecond of the board."""
+"""Walls on the firmware of both boards in the daemon's own loop, in the rig's time: a tick is a millisecond of the board."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from tests.firmware.board import Board, Built
 TICKS = 2000
 SETTLED = 500
 STIFFNESS_N_PER_M = 2000.0
-COUNT_M = 14.51e-6
+STILL_M = {"hapkit": 4.5 * 14.51e-6, "uno": 4.5 * 7.67e-6}
+"""Four counts: ring-damping leaves as many of a coarse sensor that is late [m]."""
 
 
 def places_m(board: Board, law: str, monkeypatch: pytest.MonkeyPatch) -> list[float]:
@@ -66,17 +67,19 @@ def places_m(board: Board, law: str, monkeypatch: pytest.MonkeyPatch) -> list[fl
     return [record.position_m[0] for record in records[-SETTLED:]]
 
 
+@pytest.mark.parametrize("parts", ["hapkit_parts", "board_parts"])
 @pytest.mark.parametrize(("law", "still"), [("", True), ("none", False)])
 def test_the_default_law_holds_a_wall_that_shakes_without_one(
-    hapkit_parts: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, law: str, still: bool
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: str, law: str, still: bool
 ) -> None:
     monkeypatch.setattr(conversation, "PATIENCE_S", PATIENCE_S)
     monkeypatch.setattr(conversation, "URGENT_PATIENCE_S", PATIENCE_S)
-    with Board(hapkit_parts, tmp_path / "port", pace="frames") as board:
+    built: Built = request.getfixturevalue(parts)
+    with Board(built, tmp_path / "port", pace="frames") as board:
         found_m = places_m(board, law, monkeypatch)
         swing_m = max(found_m) - min(found_m)
         if still:
-            assert swing_m < 4.5 * COUNT_M  # four counts: ring-damping leaves as many of a coarse sensor that is late
+            assert swing_m < STILL_M[board.kind]
             depth_m = PRESS_N / STIFFNESS_N_PER_M
             assert sum(found_m) / SETTLED == pytest.approx(WALL_M - HELD_M - depth_m, abs=0.1 * depth_m)
         else:
