@@ -182,4 +182,4 @@ if __name__ == "__main__":
         try:
             print(row(each, measure(each, int(sys.argv[1]) if len(sys.argv) > 1 else 4000)))  # noqa: T201 - its output
         except (AssertionError, pytest.skip.Exception) as error:
-            print(f"| {each} | {error} |")  # noqa: T201
+            print(f"| {each} | {error} |")  # noqa: T201 - its output

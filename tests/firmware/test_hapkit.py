@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-import shutil
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
 from hapticd_drivers.rig import messages
-from tests.firmware.board import Board, Built, Kind, Pace, build
+from tests.firmware.board import Board, Kind, Pace
 from tests.firmware.talk import Talk
-from tests.firmware.tools import FIRMWARE
 
 PULLEY_M, SECTOR_M, HANDLE_M = 0.005, 0.074, 0.070
 COUNT_M = math.pi * PULLEY_M * HANDLE_M / SECTOR_M / 1024
@@ -86,52 +82,6 @@ def test_positions_are_even_to_two_counts_over_a_half_turn(board: Board) -> None
             board.grip(2000.0, 4.0, step * 17 * COUNT_M)
             board.run(7_000)
             assert count() == pytest.approx(board.state().counts, abs=2)
-
-
-BEND = 0.1
-"""Of the voltage's slope; its greatest error is that over 2 pi of a half turn: 16 counts, 0.24 mm."""
-
-
-@pytest.fixture(scope="module")
-def with_table(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """A board whose table has been measured on a sensor that is bent."""
-    shares = [step / 1000 for step in range(-100, 1101)]
-    raws = [15 + 965 * (share + BEND * math.sin(2.0 * math.pi * share) / (2.0 * math.pi)) for share in shares]
-    table = [
-        round(1024 * min((abs(raw - 64 * node), share) for raw, share in zip(raws, shares, strict=True))[1])
-        for node in range(17)
-    ]
-    firmware = tmp_path_factory.mktemp("table") / "firmware"
-    for folder in ("protocol", "serial-rig"):
-        shutil.copytree(FIRMWARE / folder, firmware / folder)
-    board_h = firmware / "serial-rig" / "hapkit" / "board.h"
-    text, found = re.subn(
-        r"#define TABLE {[^}]*}", f"#define TABLE {{{', '.join(map(str, table))}}}", board_h.read_text()
-    )
-    assert found == 1
-    board_h.write_text(text)
-    return build(firmware.parent, "hapkit", firmware)
-
-
-def unevenness(board: Board) -> int:
-    """Largest error over the half turns of the travel [counts]."""
-    board.plant(mass_kg=0.002, damping_n_s_per_m=0.5)
-    board.bend_sensor(BEND)
-    with Talk(board) as host:
-        host.greet()
-        count = counts_from(host)
-        worst = 0
-        for step in range(40):
-            board.grip(2000.0, 4.0, step * 45 * COUNT_M)
-            board.run(7_000)
-            worst = max(worst, abs(count() - board.state().counts))
-    return worst
-
-
-def test_a_measured_table_makes_an_uneven_sensor_even(board: Board, with_table: Built, tmp_path: Path) -> None:
-    assert unevenness(board) > 14
-    with Board(with_table, tmp_path / "with-table", "steps") as mended:
-        assert unevenness(mended) <= 3
 
 
 def test_a_sensor_that_jumps_further_than_a_hand_is_a_fault_and_not_a_position(board: Board) -> None:

@@ -25,9 +25,9 @@ def device(
 ) -> None:
     """Measure what a tick costs on the configured device, next to the simulated one.
 
-    The loop is the daemon's, at the configuration's rate and under its law, without its scene: in one wall, with a force
-    of at most 1 mN. The device is opened and armed some ten times, so that an arm that carries itself sinks in between:
-    hold it. End a daemon that has the device first.
+    The loop is the daemon's, at the configuration's rate and under its law, in one wall in the place of its scene, and
+    with a force of at most 1 mN. The device is opened and armed some ten times, so that an arm that carries itself
+    sinks in between: hold it. End a daemon that has the device first.
 
     Example: hapticd bench device --config lab.toml
     """

@@ -90,7 +90,10 @@ class HidDouble:
         return Look(int(force_un), float(x_m), float(v_m_per_s), int(sequence))
 
     def set(self, what: str, value: float, axis: int = 0) -> None:
-        """`x_m`, `hand_n`, `motor_sign`, `switch_m`, `silence_ms`, `capabilities`, `buttons` or `mute`."""
+        """`x_m`, `hand_n`, `motor_sign`, `switch_m`, `silence_ms`, `capabilities`, `buttons` or `mute`.
+
+        `frames`: from now on a millisecond passes with each message, so that load on this computer means nothing to it.
+        """
         self.tell(f"set {what} {value!r} {axis}")
 
     def catch_up(self, driver: Driver[Any]) -> None:

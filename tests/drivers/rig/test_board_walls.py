@@ -1,4 +1,4 @@
-"""Walls on the firmware of both boards in the daemon's own loop, in the rig's time: a tick is a millisecond of the board."""
+"""Walls on the firmware of both boards in the daemon's own loop: a tick is a millisecond of the board."""
 
 from __future__ import annotations
 

@@ -155,6 +155,7 @@ def calmest_pressed(double: HidDouble, law: str, still: bool) -> Rest:
     for _ in range(ATTEMPTS):
         double.set("hand_n", 0.0)
         double.set("x_m", START_M)
+        double.set("frames", 1)
         with started(double, STIFF_N_PER_M, law) as daemon:
             try:
                 press(double, daemon.wait_ready())

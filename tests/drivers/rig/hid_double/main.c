@@ -17,6 +17,7 @@ enum { FORCE = 0x07, FORCES = 4096, LINE = 400, NAP_NS = 200000 };
 
 static const double M_PER_PM = 1e-12;
 static const double N_PER_UN = 1e-6;
+static const double MESSAGE_S = 0.001;
 static const double LONGEST_STEP_S = 1.0; /* a computer that was stopped for longer makes up for this much */
 
 struct rig_on_usb {
@@ -27,6 +28,7 @@ struct rig_on_usb {
     double count_0_m[RIG_AXES]; /* where it stood when it was switched on; 0 when its sensor knows better */
     double switch_m;            /* the home switch is closed below */
     double switched_on_s, now_s;
+    double frames_s; /* at the pace of messages: time, a millisecond of which passes with each; 0 with the clock */
     bool plugged, mute;
     int sequence; /* of the last message that came; -1: none */
     int32_t forces_un[FORCES]; /* of the first axis, as they came */
@@ -42,7 +44,7 @@ static double clock_s(void)
 
 static void move_on(struct rig_on_usb *rig)
 {
-    double now_s = clock_s();
+    double now_s = rig->frames_s > 0.0 ? rig->frames_s : clock_s();
     double time_s = now_s - rig->now_s < LONGEST_STEP_S ? now_s - rig->now_s : LONGEST_STEP_S;
     rig->now_s = now_s;
     for (uint8_t axis = 0; axis < rig->about->axes; axis++) {
@@ -79,6 +81,10 @@ static void talk(struct rig_on_usb *rig)
         }
         move_on(rig);
         host_rig_write_report(rig->host, report + 1, REPORT);
+        if (rig->frames_s > 0.0) {
+            rig->frames_s += MESSAGE_S;
+            move_on(rig);
+        }
     }
     while (host_rig_read_report(rig->host, report)) {
         if (!rig->mute) {
@@ -105,6 +111,8 @@ static void set(struct rig_on_usb *rig, const char *what, double value, int axis
         rig->about->capabilities = (uint8_t)value;
     } else if (!strcmp(what, "buttons")) {
         host_rig_set_buttons(rig->host, (uint16_t)value);
+    } else if (!strcmp(what, "frames")) {
+        rig->frames_s = rig->now_s;
     } else if (!strcmp(what, "mute")) {
         rig->mute = value != 0.0;
     } else {
