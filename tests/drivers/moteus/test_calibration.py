@@ -11,8 +11,9 @@ import pytest
 
 from hapticd.errors import DeviceFaultError, DriverStateError
 from hapticd_drivers.motors import crew
-from tests.drivers.moteus.lab import RADIUS_M, Lab, axes, lab
+from tests.drivers.moteus.lab import Lab, axes
 from tests.drivers.motors.bench import PATIENCE_S
+from tests.drivers.motors.lab import RADIUS_M
 
 BOUND_N = 0.5
 
@@ -20,7 +21,7 @@ BOUND_N = 0.5
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
     monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
-    with lab("fdcanusb", tmp_path, 1, monkeypatch) as made:
+    with Lab("fdcanusb", tmp_path, 1, monkeypatch) as made:
         made.first.shaft.x_m = -0.035
         yield made
 

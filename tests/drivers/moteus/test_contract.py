@@ -10,7 +10,7 @@ import pytest
 
 from hapticd.testing.driver_contract import AnyDriver, DriverContract
 from hapticd_drivers.motors import crew
-from tests.drivers.moteus.lab import Lab, lab
+from tests.drivers.moteus.lab import Lab
 from tests.drivers.motors.bench import PATIENCE_S
 
 
@@ -21,7 +21,7 @@ class TestMoteus(DriverContract):
     ) -> Iterator[AnyDriver]:
         monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
         way, count = request.param
-        with lab(way, tmp_path, count, monkeypatch) as made:
+        with Lab(way, tmp_path, count, monkeypatch) as made:
             self.lab: Lab = made
             yield made.driver()
 

@@ -7,15 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.drivers.moteus.lab import MOST_N_M, RADIUS_M, Lab, lab
+from tests.drivers.moteus.lab import Lab
 from tests.drivers.motors.daemon_contract import MotorDaemonContract
+from tests.drivers.motors.lab import MOST_N_M, RADIUS_M
 
 pytestmark = pytest.mark.timeout(300)
 
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
-    with lab("fdcanusb", tmp_path, 1, monkeypatch) as made:
+    with Lab("fdcanusb", tmp_path, 1, monkeypatch) as made:
         yield made
 
 

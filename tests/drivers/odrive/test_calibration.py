@@ -11,7 +11,8 @@ from hapticd.errors import DeviceFaultError, DriverStateError
 from hapticd_drivers.motors import crew
 from hapticd_drivers.odrive import crew as odrive_crew
 from tests.drivers.motors.bench import PATIENCE_S
-from tests.drivers.odrive.lab import RADIUS_M, Lab, axes, lab
+from tests.drivers.motors.lab import RADIUS_M
+from tests.drivers.odrive.lab import Lab, axes
 
 BOUND_N = 0.5
 
@@ -22,7 +23,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
     monkeypatch.setattr(odrive_crew, "LOOKED_S", PATIENCE_S)
     monkeypatch.setattr(odrive_crew, "OBEYS_S", PATIENCE_S)
     monkeypatch.setattr(odrive_crew, "HEARTBEAT_S", PATIENCE_S)
-    with lab("slcan", tmp_path, 1, monkeypatch) as made:
+    with Lab("slcan", tmp_path, 1, monkeypatch) as made:
         made.first.shaft.x_m = -0.035
         made.first.watchdog_s = 0.2
         made.bench.idle_passes = True

@@ -13,7 +13,7 @@ from hapticd.testing.driver_contract import AnyDriver, DriverContract
 from hapticd_drivers.motors import crew
 from hapticd_drivers.odrive import crew as odrive_crew
 from tests.drivers.motors.bench import PATIENCE_S
-from tests.drivers.odrive.lab import Lab, lab
+from tests.drivers.odrive.lab import Lab
 
 
 class TestOdrive(DriverContract):
@@ -26,7 +26,7 @@ class TestOdrive(DriverContract):
         monkeypatch.setattr(odrive_crew, "OBEYS_S", PATIENCE_S)
         monkeypatch.setattr(odrive_crew, "LOOKED_S", PATIENCE_S)
         way, count = request.param
-        with lab(way, tmp_path, count, monkeypatch) as made:
+        with Lab(way, tmp_path, count, monkeypatch) as made:
             self.lab: Lab = made
             yield made.driver()
 

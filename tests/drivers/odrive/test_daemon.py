@@ -8,14 +8,15 @@ from pathlib import Path
 import pytest
 
 from tests.drivers.motors.daemon_contract import MotorDaemonContract
-from tests.drivers.odrive.lab import MOST_N_M, RADIUS_M, Lab, lab
+from tests.drivers.motors.lab import MOST_N_M, RADIUS_M
+from tests.drivers.odrive.lab import Lab
 
 pytestmark = pytest.mark.timeout(300)
 
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
-    with lab("slcan", tmp_path, 1, monkeypatch) as made:
+    with Lab("slcan", tmp_path, 1, monkeypatch) as made:
         yield made
 
 

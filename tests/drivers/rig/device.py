@@ -98,6 +98,8 @@ class Rig:
         down, up: spoil the line, to the rig and from it.
         heard: sequence number of the last message that was sent to it, spoilt or not; -1 before the first.
         spoke: something was sent from it after that.
+        peak_n: largest force of its motor since `watch_force` [N].
+        pushed_us: how long its motor has pushed since then [us of the rig].
     """
 
     def __init__(self, core: ctypes.CDLL, port: Path, pace: Literal["frames", "real"] = "frames") -> None:
@@ -109,6 +111,8 @@ class Rig:
         self.up: Spoiler = bytes
         self.heard = -1
         self.spoke = False
+        self.peak_n = 0.0
+        self.pushed_us = 0
         self._core = core
         self._pace = pace
         self._listener = FrameReader()
@@ -195,6 +199,11 @@ class Rig:
         with self.lock:
             return 1e-6 * float(self._core.host_rig_force(self._rig, 0))
 
+    def watch_force(self) -> None:
+        """Begin to look at what its motor does."""
+        with self.lock:
+            self.peak_n, self.pushed_us = 0.0, 0
+
     def wait_for(self, driver: SerialRig) -> Rig:
         """Return when all that a driver has sent has come, and what it caused is there for the driver to read."""
         talk = driver._talk
@@ -247,7 +256,10 @@ class Rig:
     def _advance(self, us: int) -> None:
         core, rig, plant = self._core, self._rig, self.plant
         for _ in range(0, us, _STEP_US):
-            plant.advance(1e-6 * core.host_rig_force(rig, 0), 1e-6 * _STEP_US)
+            force_n = 1e-6 * core.host_rig_force(rig, 0)
+            self.peak_n = max(self.peak_n, abs(force_n))
+            self.pushed_us += _STEP_US if force_n else 0
+            plant.advance(force_n, 1e-6 * _STEP_US)
             self._now_us += _STEP_US
             core.host_rig_set_position(rig, 0, self.counts)
             core.host_rig_set_home_switch(rig, plant.position_m < self.switch_at_m)
