@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 
 import pytest
 
 from hapticd import discovery, plugins
+from hapticd.config.loading import load
 from hapticd.config.models import LoopConfig
 from hapticd.device import FoundDevice
 from hapticd.discovery import Discovery, look
@@ -106,6 +108,28 @@ def test_a_rig_is_looked_for_where_its_options_say(tmp_path: Path) -> None:
     node.unlink()
     found = says(driver.devices(looked("serial-rig", SerialRigOptions(port=str(node))), 0), "problem", "no device")
     assert found.mend[0].startswith("# plug the rig in")
+
+
+CONFIGURED = ("omega7", "falcon", "serial-rig", "hapkit", "hid-rig", "moteus", "odrive", "inverse3")
+"""Shipped configurations, one a device."""
+
+
+@pytest.mark.parametrize("name", CONFIGURED)
+def test_the_doctor_knows_every_device_that_a_configuration_is_shipped_for(name: str) -> None:
+    """Whatever is plugged in here: each looks, and each problem comes with what to do."""
+    loaded = load(directory("config") / f"{name}.toml")
+    answer = looked(loaded.config.device.driver, loaded.options)
+    assert answer.problem == ""
+    found = [*driver.needs(answer), *driver.devices(answer, 0)]
+    assert not [one for one in found if one.mark == "unknown"]
+    assert [one.text for one in found if one.mark == "problem" and not one.mend] == []
+
+
+def test_every_driver_of_ours_looks_and_diagnoses_by_itself() -> None:
+    for name in {load(directory("config") / f"{each}.toml").config.device.driver for each in CONFIGURED}:
+        own = plugins.driver(name)
+        for method in ("find", "diagnose"):
+            assert inspect.getattr_static(own, method) is not vars(Driver)[method], f"{name}.{method}"
 
 
 def test_a_device_that_cannot_be_used_is_a_problem_unless_there_is_another() -> None:

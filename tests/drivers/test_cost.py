@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.drivers.cost import DOUBLES, measure, row
-
-ATTEMPTS = 5
-"""A computer that is away for 50 ms stops any real device's loop."""
+from tests.drivers.cost import ATTEMPTS, DOUBLES, measure, row
 
 
 @pytest.mark.nightly

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from hapticd.device import DeviceInfo, FoundDevice, Metric, Sample
+from hapticd.device import DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
 from hapticd.driver import Driver, DriverOptions, DriverState
 from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DeviceProtocolError, DeviceTimeoutError
 from hapticd_drivers.haply import messages
@@ -15,6 +15,7 @@ from hapticd_drivers.haply.courier import Courier
 
 AUTO = "auto"
 URL = "ws://127.0.0.1:10001"
+INSTALL = "# install and start the Haply Inverse service, version 3: docs/inverse3.md"
 
 PATIENCE = 0.25
 """Share of the period for which a tick waits for a state that is late."""
@@ -87,6 +88,31 @@ class Inverse3(Driver[Inverse3Options]):
             return [FoundDevice("Inverse3", name, url) for name in messages.devices(courier.first)]
         finally:
             courier.end()
+
+    @classmethod
+    def diagnose(cls, options: Inverse3Options | None = None) -> list[Diagnosis]:
+        """Whether the service is there and speaks as this driver does, and whether it is clear which device is meant.
+
+        Args:
+            options: those of the configuration.
+        """
+        url, wanted = (URL, AUTO) if options is None else (options.url, options.device)
+        try:
+            courier = Courier(url)
+        except DeviceNotFoundError as error:
+            return [Diagnosis("problem", str(error).removeprefix("inverse3: "), (INSTALL,))]
+        try:
+            there = messages.devices(courier.first)
+        except ValueError as error:
+            text = f"what answers at {url} is no Inverse service of version 3 ({error})"
+            return [Diagnosis("problem", text, (INSTALL,))]
+        finally:
+            courier.end()
+        found = [Diagnosis("ok", f"the Inverse service at {url} lists {', '.join(there) or 'no Inverse3'}")]
+        if wanted == AUTO and len(there) > 1:
+            which = "# in the configuration, [device.options]: device = ...; hapticd devices inverse3 lists them"
+            found.append(Diagnosis("problem", "which of them is meant is not clear", (which,)))
+        return found
 
     def _open(self) -> DeviceInfo:
         options = self.options

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from pathlib import Path
 
 from pydantic import Field
 from serial.tools import list_ports
@@ -10,6 +10,7 @@ from serial.tools import list_ports
 from hapticd.device import Diagnosis, FoundDevice
 from hapticd.errors import DeviceNotFoundError
 from hapticd_drivers.moteus.crew import MoteusCrew
+from hapticd_drivers.motors.adapters import found_interface, found_port
 from hapticd_drivers.motors.ascii_link import AsciiLink
 from hapticd_drivers.motors.crew import Crew
 from hapticd_drivers.motors.driver import MotorDriver
@@ -75,24 +76,12 @@ class Moteus(MotorDriver[MoteusOptions]):
             options: which one is meant; None: any.
         """
         wanted = AUTO if options is None else options.channel
-        note = "which controllers are behind it shows when it is opened"
-        found = [
-            FoundDevice(
-                "fdcanusb",
-                serial,
-                path,
-                problem="" if allowed else "this user may not open it",
-                note=note,
-                mend=() if allowed else ("sudo usermod -aG dialout $USER  # then log in again",),
-            )
-            for path, serial in _adapters()
-            if wanted in (AUTO, path)
-            for allowed in [os.access(path, os.R_OK | os.W_OK)]
-        ]
-        return found + [
-            FoundDevice("CAN interface", "", name, note=f"{note}; it has to be up: {UP.format(name)}")
-            for name in can_interfaces()
-            if wanted in (AUTO, name)
+        adapters = _adapters()
+        if wanted.startswith("/") and Path(wanted).exists() and wanted not in dict(adapters):
+            return [found_port("fdcanusb", wanted)]  # by another name, as those of /dev/serial/by-id
+        return [
+            *(found_port("fdcanusb", path, serial) for path, serial in adapters if wanted in (AUTO, path)),
+            *(found_interface(name, UP.format(name), fd=True) for name in can_interfaces() if wanted in (AUTO, name)),
         ]
 
     @classmethod

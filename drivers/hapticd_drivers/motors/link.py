@@ -15,6 +15,8 @@ Frame = tuple[int, bytes]
 
 _SYSFS = Path("/sys/class/net")
 _ARPHRD_CAN = "280"
+_IFF_UP = 1  # linux/if.h
+_CANFD_MTU = 72  # linux/can.h
 
 
 class BusLink(Protocol):
@@ -106,6 +108,16 @@ class TracedLink:
 def can_interfaces() -> list[str]:
     """Every CAN interface of the kernel, up or not."""
     return sorted(place.parent.name for place in _SYSFS.glob("*/type") if place.read_text().strip() == _ARPHRD_CAN)
+
+
+def is_up(interface: str) -> bool:
+    """Whether a CAN interface is up."""
+    return int((_SYSFS / interface / "flags").read_text(), 16) & _IFF_UP != 0
+
+
+def carries_fd(interface: str) -> bool:
+    """Whether a CAN interface that is up takes frames of more than eight bytes."""
+    return int((_SYSFS / interface / "mtu").read_text()) >= _CANFD_MTU
 
 
 def only(driver: str, there: list[str], what: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
@@ -9,6 +10,7 @@ from pydantic import Field
 from hapticd.device import Diagnosis, FoundDevice
 from hapticd.errors import DeviceNotFoundError
 from hapticd_drivers.motors import slcan
+from hapticd_drivers.motors.adapters import found_interface, found_port
 from hapticd_drivers.motors.ascii_link import AsciiLink
 from hapticd_drivers.motors.crew import Crew
 from hapticd_drivers.motors.driver import MotorDriver
@@ -80,21 +82,17 @@ class Odrive(MotorDriver[OdriveOptions]):
 
     @classmethod
     def find(cls, options: OdriveOptions | None = None) -> list[FoundDevice]:
-        """Every CAN interface that ODrives may be behind; none is opened.
+        """Every CAN interface that ODrives may be behind, or the serial port that is named; none is opened.
 
         Args:
             options: which one is meant; None: any.
         """
         wanted = AUTO if options is None else options.channel
         bitrate = 1_000_000 if options is None else options.bitrate
+        if wanted.startswith("/") and Path(wanted).exists():
+            return [found_port("slcan adapter", wanted)]
         return [
-            FoundDevice(
-                "CAN interface",
-                "",
-                name,
-                note="which ODrives are behind it shows when it is opened; it has to be up: "
-                + UP.format(name, bitrate),
-            )
+            found_interface(name, UP.format(name, bitrate), fd=False)
             for name in can_interfaces()
             if wanted in (AUTO, name)
         ]

@@ -218,6 +218,27 @@ def test_it_is_found_where_the_service_runs(service: FakeService) -> None:
     assert service.messages == 0
 
 
+def test_the_doctor_hears_what_the_service_lists_and_what_to_do_without_one(service: FakeService) -> None:
+    options = Inverse3Options(url=service.url)
+    (well,) = Inverse3.diagnose(options)
+    assert (well.mark, "lists 049D" in well.text) == ("ok", True)
+    service.device = ""
+    (none,) = Inverse3.diagnose(options)
+    assert (none.mark, "lists no Inverse3" in none.text) == ("ok", True)
+    service.stop()
+    (gone,) = Inverse3.diagnose(options)
+    assert (gone.mark, "no Haply Inverse service" in gone.text) == ("problem", True)
+    assert "docs/inverse3.md" in gone.mend[0]
+
+
+def test_the_doctor_hears_when_it_is_not_clear_which_device_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
+    with FakeService() as service:
+        monkeypatch.setattr(messages, "devices", lambda _: ["049D", "04A1"])
+        _, unclear = Inverse3.diagnose(Inverse3Options(url=service.url))
+        assert unclear.mark == "problem"
+        assert len(Inverse3.diagnose(Inverse3Options(url=service.url, device="04A1"))) == 1
+
+
 @examples(300)
 @given(
     force_n=st.tuples(*[st.floats(-10, 10)] * 3), device=st.text(max_size=20), key=st.sampled_from(["vector", "values"])

@@ -231,14 +231,17 @@ def test_a_loop_that_is_killed_leaves_the_rig_without_force(double: HidDouble, d
     assert "the device is without force" in daemon.output()
 
 
-def test_a_user_finds_the_rig(double: HidDouble) -> None:
-    listed = subprocess.run(
-        [HAPTICD, "devices", "hid-rig"],
-        env={**os.environ, **double.environment},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "host-rig" in listed.stdout
-    assert SERIAL in listed.stdout
-    assert "/dev/hidraw0" in listed.stdout
+def test_a_user_finds_the_rig_and_the_doctor_does(double: HidDouble, tmp_path: Path) -> None:
+    config = tmp_path / "lab.toml"
+    config.write_text('[device]\ndriver = "hid-rig"\n')
+    for command in (["devices", "hid-rig"], ["doctor", "--config", str(config), "--no-latency"]):
+        told = subprocess.run(
+            [HAPTICD, *command],
+            env={**os.environ, **double.environment, "COLUMNS": "200"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert "host-rig" in told.stdout, told.stderr
+        assert SERIAL in told.stdout
+        assert "/dev/hidraw0" in told.stdout
