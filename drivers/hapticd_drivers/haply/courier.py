@@ -101,11 +101,17 @@ class Courier(threading.Thread):
         try:
             self._loop.run_until_complete(self._carry())
         except Exception as error:  # noqa: BLE001 - whatever it was, the device is gone, and the loop has to hear of it
-            self.failed = _lost(self._url, error, self._reached.is_set())
+            self._fail(_lost(self._url, error, self._reached.is_set()))
         finally:
             self._loop.close()
             self._reached.set()
             self._came.set()
+
+    def _arrive(self, message: str | bytes) -> None:
+        self.newest = message
+
+    def _fail(self, error: DriverError) -> None:
+        self.failed = error
 
     async def _carry(self) -> None:
         connection: Any
@@ -114,7 +120,8 @@ class Courier(threading.Thread):
         async with connect(
             self._url, compression=None, proxy=None, open_timeout=OPEN_S, close_timeout=0.2, max_size=MOST_BYTES
         ) as connection:
-            self.first = self.newest = await asyncio.wait_for(connection.recv(), OPEN_S)
+            self._arrive(await asyncio.wait_for(connection.recv(), OPEN_S))
+            self.first = self.newest
             self._reached.set()
             while True:
                 await self._go.wait()
@@ -124,7 +131,7 @@ class Courier(threading.Thread):
                 if message is not None:
                     started_ns = time.monotonic_ns()
                     await connection.send(message)
-                    self.newest = await connection.recv()
+                    self._arrive(await connection.recv())
                     self.exchange_ns = time.monotonic_ns() - started_ns
                     self.exchanges += 1
                     self._came.set()

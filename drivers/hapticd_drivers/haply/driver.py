@@ -8,10 +8,13 @@ from collections.abc import Sequence
 from pydantic import Field
 
 from hapticd.device import DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
-from hapticd.driver import Driver, DriverOptions, DriverState
+from hapticd.driver import Driver, DriverState
 from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DeviceProtocolError, DeviceTimeoutError
+from hapticd.trace import DriverTrace
 from hapticd_drivers.haply import messages
 from hapticd_drivers.haply.courier import Courier
+from hapticd_drivers.haply.traced_courier import TracedCourier
+from hapticd_drivers.trace import TraceOptions
 
 AUTO = "auto"
 URL = "ws://127.0.0.1:10001"
@@ -38,7 +41,7 @@ METRICS = (
 EXCHANGE_US, LONGEST_EXCHANGE_US, TICKS_WITHOUT_STATE, DROPPED, BAD = range(len(METRICS))
 
 
-class Inverse3Options(DriverOptions):
+class Inverse3Options(TraceOptions):
     """Which service, which device, and what its forces are bounded by."""
 
     url: str = Field(URL, pattern=r"^ws://[^/\s]+(/\S*)?$", description="of the Inverse service, version 3")
@@ -64,6 +67,7 @@ class Inverse3(Driver[Inverse3Options]):
 
     def __init__(self, options: Inverse3Options, period_s: float) -> None:
         super().__init__(options, period_s)
+        self.trace = DriverTrace(options.trace)
         self._courier: Courier | None = None
         self._device = ""
         self._sample = Sample(len(messages.AXES))
@@ -116,7 +120,7 @@ class Inverse3(Driver[Inverse3Options]):
 
     def _open(self) -> DeviceInfo:
         options = self.options
-        self._courier = courier = Courier(options.url)
+        self._courier = courier = TracedCourier(options.url, self.trace) if options.trace else Courier(options.url)
         try:
             there = messages.devices(courier.first)
         except ValueError as error:
