@@ -17,9 +17,10 @@ def said(driver: Inverse3) -> list[tuple[str, str]]:
     return [(way, text) for _, way, text in (line.split(" ", 2) for line in driver.trace.lines())]
 
 
-def tick(driver: Inverse3) -> None:
-    driver.read()
-    driver.write([0.0, 0.0, 0.5])
+def ticks(driver: Inverse3, count: int) -> None:
+    for _ in range(count):
+        driver.read()
+        driver.write([0.0, 0.0, 0.5])
 
 
 def test_each_message_is_kept_as_it_went_and_came_and_the_end_as_well() -> None:
@@ -28,8 +29,7 @@ def test_each_message_is_kept_as_it_went_and_came_and_the_end_as_well() -> None:
         driver._state_wait_s = 1.0
         driver.open()
         driver.enable()
-        for _ in range(20):
-            tick(driver)
+        ticks(driver, 20)
         driver.read()
         (way, went), (back, came) = said(driver)[-2:]
         assert (way, back) == (">", "<")
@@ -38,8 +38,7 @@ def test_each_message_is_kept_as_it_went_and_came_and_the_end_as_well() -> None:
         assert len(said(driver)) == 9
         service.stop()
         with pytest.raises(DeviceDisconnectedError):
-            for _ in range(5):
-                tick(driver)
+            ticks(driver, 5)
         driver.close()
     assert driver.trace.lines()[-1].split(" ", 1)[1].startswith("inverse3: the service at")
 
