@@ -43,19 +43,27 @@ def pressing(bench: Bench) -> ForceDimension:
     return driver
 
 
-def ticks_until_fault(driver: ForceDimension, kind: type[DriverError], text: str) -> int:
+def ticks_until_fault(bench: Bench, driver: ForceDimension, kind: type[DriverError], text: str) -> tuple[int, float]:
+    """Ticks until the error, and the largest force of the device in them [N]."""
     ticks = 0
+    peak_n = 0.0
 
     def press_on() -> None:
-        nonlocal ticks
+        nonlocal ticks, peak_n
         while ticks < 1000:
             ticks += 1
             driver.read()
             driver.write([0.0, 0.0, 2.0])
+            peak_n = max(peak_n, push_n(bench))
 
     with pytest.raises(kind, match=re.escape(text)):
         press_on()
-    return ticks
+    return ticks, peak_n
+
+
+def push_n(bench: Bench) -> float:
+    """What the device pushes with, magnitude [N]."""
+    return math.hypot(*bench.vector("force_n"))
 
 
 def overspeed(bench: Bench) -> None:
@@ -63,18 +71,18 @@ def overspeed(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize(
-    ("happen", "text"),
+    ("happen", "text", "peak_n"),
     [
-        (Bench.press_force_button, "the force button on the device was pressed"),
-        (overspeed, "the device's own velocity limit was exceeded"),
-        (lambda bench: bench.set(error=3), "the device reports an error of its own (3)"),
+        (Bench.press_force_button, "the force button on the device was pressed", 0.0),
+        (overspeed, "the device's own velocity limit was exceeded", 0.0),
+        (lambda bench: bench.set(error=3), "the device reports an error of its own (3)", 2.0),  # it goes on until told
     ],
 )
 @pytest.mark.usefixtures("kind")
 def test_a_stop_of_the_device_is_noticed_within_the_status_ticks_and_named(
-    bench: Bench, happen: Callable[[Bench], None], text: str
+    bench: Bench, happen: Callable[[Bench], None], text: str, peak_n: float
 ) -> None:
-    stops(bench, happen, text)
+    stops(bench, happen, text, peak_n)
 
 
 def test_a_stop_by_its_watchdog_is_noticed_and_named_too(bench: Bench) -> None:
@@ -85,11 +93,13 @@ def test_a_stop_by_its_watchdog_is_noticed_and_named_too(bench: Bench) -> None:
     )
 
 
-def stops(bench: Bench, happen: Callable[[Bench], None], text: str) -> None:
+def stops(bench: Bench, happen: Callable[[Bench], None], text: str, most_n: float = 0.0) -> None:
     """The device stops by itself, the driver says so, and forces come back only when they are enabled anew."""
     driver = pressing(bench)
     happen(bench)
-    assert ticks_until_fault(driver, DeviceFaultError, text) <= STATUS_TICKS + 1
+    ticks, peak_n = ticks_until_fault(bench, driver, DeviceFaultError, text)
+    assert ticks <= STATUS_TICKS + 1
+    assert peak_n == most_n
     driver.disable()
     assert bench.get("mode") == BRAKE
     assert bench.vector("force_n") == [0.0, 0.0, 0.0]
@@ -212,9 +222,14 @@ def ticks_until_code(driver: ForceDimension, tick: ControlTick, code: EventCode)
     raise AssertionError(f"no {code}")
 
 
-def until_disarmed(driver: ForceDimension, tick: ControlTick) -> int:
+def until_disarmed(bench: Bench, driver: ForceDimension, tick: ControlTick) -> int:
+    """Ticks until it is out; the force only falls on the way."""
+    before_n = push_n(bench)
     for count in range(1, 200):
         driver.write(tick.step(driver.read(), 1e-3))
+        now_n = push_n(bench)
+        assert now_n <= before_n + 1e-9
+        before_n = now_n
         if tick.guard.mode is Mode.DISARMED:
             return count
     raise AssertionError("still armed")
@@ -225,7 +240,7 @@ def test_data_that_is_never_new_is_a_frozen_device(bench: Bench) -> None:
     driver, tick = armed(bench)
     bench.set(stale=1)
     assert ticks_until_code(driver, tick, EventCode.DEVICE_FROZEN) == round(FROZEN_S / 1e-3)
-    assert until_disarmed(driver, tick) <= 51
+    assert until_disarmed(bench, driver, tick) <= 51
     assert bench.vector("force_n") == [0.0, 0.0, 0.0]
     driver.close()
 
@@ -236,7 +251,7 @@ def test_garbage_is_an_impossible_sample_and_the_force_is_out_within_10_ms(bench
     driver, tick = armed(bench)
     bench.set(garbage=garbage)
     assert ticks_until_code(driver, tick, EventCode.SAMPLE_IMPOSSIBLE) == 1
-    assert until_disarmed(driver, tick) <= 10
+    assert until_disarmed(bench, driver, tick) <= 10
     assert bench.vector("force_n") == [0.0, 0.0, 0.0]
     driver.close()
 

@@ -107,6 +107,10 @@ class HidDouble:
         """The forces of the first axis that have come since the last call, in the order in which they came [uN]."""
         return [int(word) for word in self.tell("forces").split()]
 
+    def peak_n(self) -> float:
+        """The largest force of the first axis since the last call [N]."""
+        return 1e-6 * int(self.tell("peak"))
+
     def send(self, report: bytes) -> None:
         """A report of any length to the computer."""
         self.tell(f"send {report.hex()}")

@@ -18,6 +18,7 @@ from hapticd.errors import (
     DeviceFaultError,
     DeviceNotFoundError,
     DeviceTimeoutError,
+    DriverError,
     DriverStateError,
 )
 from hapticd.testing.driver_contract import AnyDriver, DriverContract
@@ -28,6 +29,7 @@ from tests.daemon.running import wait_until
 from tests.drivers.rig.hid_bench import HAS_HOME_SWITCH, SERIAL, HidDouble, build
 
 STALLED_TICKS = 50
+PAGE = Path(__file__).parents[3] / "docs" / "hid-rig.md"
 
 
 @pytest.fixture(scope="session")
@@ -262,6 +264,32 @@ def test_a_fault_of_the_rig_says_what_it_is(double: HidDouble, enabled: HidRig) 
     double.tell("mend")
     enabled.enable()
     assert enabled.state is DriverState.ENABLED
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "kind", "most_ticks", "peak_n"),
+    [
+        ("encoder fault", "break 1 0 7", DeviceFaultError, 2, 0.0),
+        ("motor driver fault", "break 2 0 7", DeviceFaultError, 2, 0.0),
+        ("switched off and on", "restart", DeviceDisconnectedError, 2, 0.0),
+        ("unplugged", "unplug", DeviceDisconnectedError, 2, 0.0),
+        ("the rig says nothing", "set mute 1 0", DeviceTimeoutError, 502, 0.1),
+    ],
+)
+def test_what_goes_wrong_is_named_soon_and_leaves_no_force(
+    double: HidDouble, enabled: HidRig, name: str, line: str, kind: type[DriverError], most_ticks: int, peak_n: float
+) -> None:
+    """The table of docs/hid-rig.md; a millisecond of the rig is a message."""
+    double.set("frames", 1)
+    enabled._state_wait_s = 0.001 if kind is DeviceTimeoutError else 1.0
+    tick(enabled, 25)
+    double.catch_up(enabled)
+    double.tell(line)
+    double.peak_n()
+    with pytest.raises(kind):
+        tick(enabled, most_ticks)
+    assert double.peak_n() == pytest.approx(peak_n)
+    assert f"| {name} | {most_ticks} | {peak_n:.2f} |" in PAGE.read_text()
 
 
 def a_state(position: int) -> bytes:

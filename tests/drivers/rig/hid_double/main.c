@@ -33,6 +33,7 @@ struct rig_on_usb {
     int sequence; /* of the last message that came; -1: none */
     int32_t forces_un[FORCES]; /* of the first axis, as they came */
     size_t forces;
+    int32_t peak_un; /* largest force of the first axis since it was asked for */
 };
 
 static double clock_s(void)
@@ -49,6 +50,8 @@ static void move_on(struct rig_on_usb *rig)
     rig->now_s = now_s;
     for (uint8_t axis = 0; axis < rig->about->axes; axis++) {
         struct plant *plant = &rig->plant[axis];
+        int32_t force_un = rig->plugged ? abs(host_rig_force(rig->host, axis)) : 0;
+        rig->peak_un = axis == 0 && force_un > rig->peak_un ? force_un : rig->peak_un;
         plant_advance(plant, rig->plugged ? host_rig_force(rig->host, axis) * N_PER_UN : 0.0, time_s);
         double count_m = rig->about->axis[axis].count_pm * M_PER_PM;
         host_rig_set_position(rig->host, axis, (int32_t)((plant->x_m - rig->count_0_m[axis]) / count_m));
@@ -147,6 +150,9 @@ static bool obey(struct rig_on_usb *rig, char *line)
             printf("%d ", rig->forces_un[i]);
         }
         rig->forces = 0;
+    } else if (!strcmp(word, "peak")) {
+        printf("%d", rig->peak_un);
+        rig->peak_un = 0;
     } else if (!strcmp(word, "set")) {
         set(rig, what, value, axis);
     } else if (!strcmp(word, "send")) {
