@@ -73,9 +73,13 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say what was repeated."""
+    """Say what was repeated, and what tests have to say though they pass: their property `prints`."""
     if repeating.REPEAT > 1:
         terminalreporter.write_line(repeating.said())
+    for report in terminalreporter.getreports("passed"):
+        for name, said in report.user_properties:
+            if name == "prints":
+                terminalreporter.write_line(str(said))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -40,7 +40,8 @@ def test_the_firmware_leaves_half_of_flash_and_ram_free(
     used = {name: float(percent) for name, percent in re.findall(r"(\w+):\s+\d+ bytes \((\d+\.\d)% Full\)", size)}
     record_property("flash_percent", used["Program"])
     record_property("ram_percent", used["Data"])
-    print(kind, size)  # noqa: T201 - the figures, shown with pytest -s
+    used_bytes = {name: int(number) for name, number in re.findall(r"(\w+):\s+(\d+) bytes", size)}
+    record_property("prints", f"firmware {kind}: {used_bytes['Program']} bytes of flash, {used_bytes['Data']} of RAM")
     assert 1.0 < used["Program"] < 50.0
     assert 1.0 < used["Data"] < 50.0
 

@@ -56,8 +56,13 @@ def run(
 
 
 @pytest.mark.parametrize("stiffness_n_per_m", [12000.0, 18000.0, 20000.0])
-@pytest.mark.parametrize(("rate_hz", "device_type"), [(1000.0, RIGHT), (1000.0, LEFT), (4000.0, RIGHT)])
-@pytest.mark.parametrize("drop_m", [0.0, 0.003, 0.01])
+@pytest.mark.parametrize(
+    ("rate_hz", "device_type", "drop_m"),
+    [
+        *((rate_hz, RIGHT, drop_m) for rate_hz in (1000.0, 4000.0) for drop_m in (0.0, 0.003, 0.01)),
+        (1000.0, LEFT, 0.003),  # whose hand makes a difference to its gripper only
+    ],
+)
 def test_energy_cycle_holds_the_papers_walls(
     bench: Bench,
     monkeypatch: pytest.MonkeyPatch,
