@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import gc
 import math
+from collections.abc import Sequence
 
 from hapticd.device import Sample
+from hapticd.tick.remote.port import Port
+from hapticd.tick.remote.update import FORCE, POSITION, VELOCITY, Update
 from hapticd.tick.space.solid_contact import SolidContact
 from hapticd.tick.space.tick import SpaceTick
 from hapticd.tick.tick import ControlTick
@@ -23,6 +26,8 @@ _SHARE_OF_LIMIT = 0.1
 def warm_up(tick: ControlTick) -> None:
     """Press and release walls or the first object of a tick made for this, as a hand would, a period a tick.
 
+    What clients drive is driven, to where it is or, by a small force, nowhere.
+
     Args:
         tick: fresh; it is of no other use afterwards.
     """
@@ -35,6 +40,7 @@ def warm_up(tick: ControlTick) -> None:
     if isinstance(tick, SpaceTick) and tick.solids:
         surface_m = _surface_of(tick.solids[0])
     period_ns = round(tick.period_s * 1e9)
+    said = [(port, _word(port, surface_m)) for port in tick.ports]
     for count in range(TICKS + 1):
         depth_m = step_m * (abs(count % (4 * _STEPS) - 2 * _STEPS) - _STEPS)
         sample.time_ns = count * period_ns
@@ -44,8 +50,20 @@ def warm_up(tick: ControlTick) -> None:
             tick.start(sample)
             tick.arm()
         else:
+            for port, update in said:
+                port.take(update)
             tick.advance(sample, tick.period_s)
     gc.collect()
+
+
+def _word(port: Port, surface_m: Sequence[float]) -> Update:
+    """What a client would say of it: an object is where it is, and the target of a coupling where the hand is."""
+    update = Update()
+    at_m = port.target_m if port.kind == "object" else surface_m
+    update.said = POSITION | VELOCITY | FORCE
+    update.position_m[: len(at_m)] = at_m
+    update.force_n[0] = _SHARE_OF_LIMIT * port.limits.max_force_n
+    return update
 
 
 def _surface_of(contact: SolidContact) -> list[float]:

@@ -7,11 +7,16 @@ from typing import Any
 
 import pytest
 
+from hapticd.config.loading import parse
 from hapticd.config.models import VelocityConfig
 from hapticd.config.safety import SafetyConfig
 from hapticd.loop.warm_up import TICKS, warm_up
+from hapticd.tick.assemble import make_tick
 from hapticd.tick.guard import Guard, Mode
+from hapticd.tick.remote.port import PortState
 from hapticd.tick.tick import ControlTick
+from tests.tick.remote.rig import COUPLING, FORCE_PORT
+from tests.tick.remote.rig import device as bench
 from tests.tick.rig import device, law, running, scene, wall
 
 RATES_HZ = (100.0, 1000.0, 4000.0, 8000.0)
@@ -59,3 +64,18 @@ def test_it_is_armed_and_without_fault_to_its_end(
     assert len(inside) == 2 * TICKS
     assert sum(inside) > 0.2 * TICKS
     assert not all(inside)
+
+
+@pytest.mark.parametrize("axes", ["x", "xyz"])
+def test_what_clients_drive_is_warm_as_well(axes: str) -> None:
+    """Couplings, forces and objects are held and in force, each law is asked, and nothing stops for it."""
+    ball = '[[scene.objects]]\nname = "ball"\nshape = "sphere"\nradius_m = 0.03\nstiffness_n_per_m = 2000.0\n'
+    loaded = parse(COUPLING + FORCE_PORT + (ball + "remote = true\n" if axes == "xyz" else ""), "bench")
+    tick = make_tick(loaded, bench(axes, simulated=False))
+    warm_up(tick)
+    assert tick.fault == 0, tick.fault_text
+    assert tick.guard.mode is Mode.ARMED
+    assert {port.kind for port in tick.ports} == {"coupling", "force", *(["object"] if axes == "xyz" else [])}
+    for port in tick.ports:
+        assert port.state is PortState.HELD
+        assert any(port.impulse_n_s)
