@@ -217,6 +217,8 @@ class ControlTick:
             ports = yield from arrange_ports(scene, self.couplings, self._port)
         new: list[Contact] = [*there.new, *axes_of(ports.new)]
         laws = [(contact, contact.law) for contact in new]
+        turned = axes_of(ports.turned)
+        laws += [(axis, axis.make_law()) for axis in turned]
         if make_law is not None:
             for contact in there.contacts:
                 if contact not in there.new:
@@ -246,7 +248,7 @@ class ControlTick:
         self._take_ports(ports)
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         if self.fallback:
-            laws = self._start_laws([(contact, self._fallback_law()) for contact in new])
+            laws = self._start_laws([(contact, self._fallback_law()) for contact in (*new, *turned)])
         for contact, law in laws:
             self._take_law(contact, law)
 

@@ -20,15 +20,17 @@ class PortArrangement:
         new: those that are new.
         changed: of those that go on the ones whose limits are others, and those limits.
         gone: those that are not in the scene any more.
+        turned: of those that go on the ones whose laws are to see another motion; they begin anew, by a ramp.
     """
 
-    __slots__ = ("changed", "gone", "new", "ports")
+    __slots__ = ("changed", "gone", "new", "ports", "turned")
 
     def __init__(self, there: Sequence[OnePort] = ()) -> None:
         self.ports = list(there)
         self.new: list[OnePort] = []
         self.changed: list[tuple[OnePort, PortLimits]] = []
         self.gone: list[OnePort] = []
+        self.turned: list[OnePort] = []
 
     def take(self) -> None:
         """Have those that go on do so under their new limits, and those that are gone fade out."""
@@ -60,6 +62,8 @@ def arrange_ports(
             yield
         elif port.limits != limits:
             arrangement.changed.append((port, limits))
+            if port.limits.driven != limits.driven:
+                arrangement.turned.append(port)
         arrangement.ports.append(port)
     arrangement.gone = list(known.values())
     return arrangement

@@ -330,3 +330,19 @@ def test_damping_against_the_ground_pulls_at_no_target(driven: bool) -> None:
     rig.go()
     pulled = rig["tool"].impulse_n_s[0] - before
     assert (pulled == pytest.approx(spring, rel=0.02)) is not driven
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_reload_that_turns_the_law_to_another_motion_comes_in_by_the_ramp(driven: bool) -> None:
+    """Against the ground a device at rest is not damped, against a target that passes by with 5 N."""
+    scene = COUPLING.replace("damping_n_s_per_m = 5.0", "driven = {}").replace("2000.0", "10.0")
+    rig = Rig(scene.format(str(not driven).lower()), law="damper")
+    forces = []
+    for n in range(400):
+        if n == 200:
+            rig.switch(scene.format(str(driven).lower()))
+        rig.say("tool", position_m=[0.1e-3 * n], velocity_m_per_s=[0.1])
+        forces.append(rig.go()[0])
+    assert abs(forces[398] - forces[198]) > 4.0
+    steps = [abs(b - a) for a, b in pairwise(forces[199:])]
+    assert max(steps) <= 2.0 * MOST_N * PERIOD_S / RAMP_S
