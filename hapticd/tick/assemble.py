@@ -13,6 +13,7 @@ from hapticd.tick.contact import RunningLaw
 from hapticd.tick.guard import Guard
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.coupling import Coupling
+from hapticd.tick.remote.one_port import PortSite
 from hapticd.tick.remote.remote_object import RemoteContact
 from hapticd.tick.remote.streamed_force import StreamedForce
 from hapticd.tick.space.tick import SpaceTick
@@ -55,4 +56,4 @@ def _make_port(
     """A coupling or a force, under the law of [remote]."""
     kind = Coupling if limits.kind == "coupling" else StreamedForce
     law = RunningLaw(config.port_law, config.port_params)
-    return kind(limits, motion, law.another, resolution_m, config.config.loop.period_s, ramp_s)
+    return kind(limits, PortSite(motion, law.another, resolution_m, config.config.loop.period_s, ramp_s))

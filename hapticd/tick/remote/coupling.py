@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import sqrt
 
 from hapticd.config.remote import PortLimits
-from hapticd.tick.contact import RunningLaw
-from hapticd.tick.motion import Motion
 from hapticd.tick.remote.follower import Follower
-from hapticd.tick.remote.one_port import OnePort
+from hapticd.tick.remote.one_port import OnePort, PortSite
 from hapticd.tick.remote.ramped import Ramped
 from hapticd.tick.remote.update import DAMPING, POSITION, STIFFNESS, VELOCITY, Update
 from hapticd.tick.space.channel import LEAST_M
@@ -27,11 +24,7 @@ class Coupling(OnePort):
 
     Args:
         limits: what it may do.
-        motion: where the device is.
-        make_law: a fresh law, one an axis.
-        resolution_m: smallest step of the device's position [m].
-        period_s: nominal time between ticks [s].
-        ramp_s: duration of its ramps [s].
+        site: where it is.
 
     Attributes:
         follower: the followed target.
@@ -40,16 +33,8 @@ class Coupling(OnePort):
 
     __slots__ = ("_speed_m_per_s", "_stretch_m", "damping", "follower")
 
-    def __init__(
-        self,
-        limits: PortLimits,
-        motion: Motion,
-        make_law: Callable[[], RunningLaw],
-        resolution_m: float,
-        period_s: float,
-        ramp_s: float,
-    ) -> None:
-        super().__init__(limits, motion, make_law, resolution_m, period_s, ramp_s)
+    def __init__(self, limits: PortLimits, site: PortSite) -> None:
+        super().__init__(limits, site)
         self.follower = Follower(len(self.channels), limits.max_speed_m_per_s, limits.hold_s)
         self.target_m = self.follower.at_m
         self.damping = Ramped(limits.damping_n_s_per_m)

@@ -7,6 +7,7 @@ them hands its calls to the port, and the port asks the laws of all.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import sqrt
 
 from hapticd.config.remote import PortLimits
@@ -29,6 +30,25 @@ STRICTLY = 1.0 - 1e-15
 _IDLE, _HELD = PortState.IDLE, PortState.HELD
 
 
+@dataclass(frozen=True, slots=True)
+class PortSite:
+    """Where couplings and forces are.
+
+    Attributes:
+        motion: where the device is.
+        make_law: a fresh law, one an axis.
+        resolution_m: smallest step of the device's position [m].
+        period_s: nominal time between ticks [s].
+        ramp_s: duration of ramps [s].
+    """
+
+    motion: Motion
+    make_law: Callable[[], RunningLaw]
+    resolution_m: float
+    period_s: float
+    ramp_s: float
+
+
 class OnePort(Port):
     """A coupling or a force under one law an axis.
 
@@ -38,11 +58,7 @@ class OnePort(Port):
 
     Args:
         limits: what it may do.
-        motion: where the device is.
-        make_law: a fresh law, one an axis.
-        resolution_m: smallest step of the device's position [m].
-        period_s: nominal time between ticks [s].
-        ramp_s: duration of its ramps [s].
+        site: where it is.
 
     Attributes:
         channels: one an axis; the first one leads.
@@ -75,27 +91,19 @@ class OnePort(Port):
         "weight",
     )
 
-    def __init__(
-        self,
-        limits: PortLimits,
-        motion: Motion,
-        make_law: Callable[[], RunningLaw],
-        resolution_m: float,
-        period_s: float,
-        ramp_s: float,
-    ) -> None:
-        axes = len(motion.position_m)
+    def __init__(self, limits: PortLimits, site: PortSite) -> None:
+        self.motion = site.motion
+        axes = len(site.motion.position_m)
         super().__init__(limits, axes)
-        self.motion = motion
         self.books = PortBooks()
-        self.channels = [PortAxis(self, axis, make_law, resolution_m) for axis in range(axes)]
-        self.ramp_s = ramp_s
+        self.channels = [PortAxis(self, axis, site.make_law, site.resolution_m) for axis in range(axes)]
+        self.ramp_s = site.ramp_s
         self.most_n = self.limit_n = limits.max_force_n
         self.stiffness = Ramped(limits.stiffness_n_per_m)
         self.weight = self.scale = 0.0
         self.asleep = True
         self.leaving = False
-        self._period_s = period_s
+        self._period_s = site.period_s
         self._due = False
         self._outside_s = self._most_change_n = 0.0
         self._from_m = [0.0] * axes  # where the device was

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import sqrt
 
 from hapticd.config.remote import PortLimits
-from hapticd.tick.contact import RunningLaw
-from hapticd.tick.motion import Motion
-from hapticd.tick.remote.one_port import OnePort
+from hapticd.tick.remote.one_port import OnePort, PortSite
 from hapticd.tick.remote.update import FORCE, RELEASED, Update
 from hapticd.tick.space.channel import LEAST_M
 
@@ -24,25 +21,14 @@ class StreamedForce(OnePort):
 
     Args:
         limits: what it may do.
-        motion: where the device is.
-        make_law: a fresh law, one an axis.
-        resolution_m: smallest step of the device's position [m].
-        period_s: nominal time between ticks [s].
-        ramp_s: duration of its ramps [s].
+        site: where it is.
     """
 
     __slots__ = ("_goal_n", "_now_n", "_same_s")
 
-    def __init__(
-        self,
-        limits: PortLimits,
-        motion: Motion,
-        make_law: Callable[[], RunningLaw],
-        resolution_m: float,
-        period_s: float,
-        ramp_s: float,
-    ) -> None:
-        super().__init__(limits, motion, make_law, resolution_m, period_s, min(ramp_s, LET_GO_S))
+    def __init__(self, limits: PortLimits, site: PortSite) -> None:
+        super().__init__(limits, site)
+        self.set_ramp(site.ramp_s)
         self._goal_n = [0.0] * len(self.channels)
         self._now_n = [0.0] * len(self.channels)
         self._same_s = 0.0
