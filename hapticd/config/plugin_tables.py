@@ -37,7 +37,7 @@ class RemoteLawTable(Table):
     """What [remote] says of the law that couplings and forces are under."""
 
     law: str = Field(
-        "energy-cycle",
+        "late-cycle",
         min_length=1,
         description="law of couplings and forces, installed or an importable module: what is late makes energy, which "
         "that of [controller] need not look at (docs/couplings.md)",

@@ -34,6 +34,7 @@ from hapticd_controllers import (
     energy_bounding,
     energy_cycle,
     input_to_state,
+    late_cycle,
     none,
     ring_damping,
     set_position,
@@ -45,7 +46,18 @@ from tests.examples import examples
 from . import machine
 from .plant import Device, Rig
 
-LAWS = (none, damper, virtual_coupling, ring_damping, energy_cycle, tdpa, energy_bounding, input_to_state, set_position)
+LAWS = (
+    none,
+    damper,
+    virtual_coupling,
+    ring_damping,
+    energy_cycle,
+    late_cycle,
+    tdpa,
+    energy_bounding,
+    input_to_state,
+    set_position,
+)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 NUMBER = st.one_of(st.floats(-20.0, 20.0), st.floats(-1e-3, 1e-3), st.sampled_from([0.0, 1e-3, 5e-324, -1e308]), FINITE)
 LONGEST = {"x_m": 1e8, "moved_m": 1e8, "velocity_m_per_s": 1e6, "contact_n": 1e18, "applied_n": 1e18}

@@ -14,6 +14,7 @@ LAWS = (
     "virtual_coupling",
     "ring_damping",
     "energy_cycle",
+    "late_cycle",
 )
 
 

@@ -12,11 +12,13 @@ from hypothesis import strategies as st
 
 from hapticd.cli import main
 from hapticd.offline.outcome import Outcome
+from hapticd.offline.rehearsal import Rehearsal
+from hapticd.tick.remote.streamed_force import BLEND_S
 from hapticd.tick.remote.update import Update
 from hapticd_studies.law_spec import parse_laws
 from hapticd_studies.remote.clients import FeltWall, Seen, TamedWall, Tool
 from hapticd_studies.remote.network import Network, turns
-from hapticd_studies.remote.runs import COLUMNS, Case, draw, run
+from hapticd_studies.remote.runs import COLUMNS, MAX_FORCE_N, Case, draw, run
 
 NETWORKS = st.builds(
     Network,
@@ -106,15 +108,42 @@ def test_the_law_of_a_port_holds_what_no_law_does(kind: str, stiffness_n_per_m: 
     """At 60 Hz and 10 ms each way such a spring swings by centimetres; with the law it rests in its place."""
     case = Case("late", kind, stiffness_n_per_m, Network(60.0, delay_s=0.01))
     assert became(case, "none")["span_m"] > 0.01
-    rested = became(case, "energy-cycle")
+    rested = became(case, "late-cycle")
     assert rested["outcome"] == Outcome.SETTLED
     assert rested["peak_force_n"] <= 12.0
 
 
 def test_a_client_that_pauses_is_let_go_and_comes_back_to_its_place() -> None:
     network = Network(200.0, delay_s=0.005, pause_at_s=1.5, pause_s=0.6)
-    rested = became(Case("paused", "force", 400.0, network), "energy-cycle")
+    rested = became(Case("paused", "force", 400.0, network), "late-cycle")
     assert rested["outcome"] == Outcome.SETTLED
+
+
+@pytest.mark.parametrize(("kind", "index"), [("tool", 263), ("tool", 371), ("force", 11)])
+def test_a_client_that_pauses_never_pushes_beyond_its_limit_and_comes_in_by_the_ramp(kind: str, index: int) -> None:
+    """Whatever has become of the device since: the client's part of the force goes no faster than ramp and motion."""
+    case = draw(4, index, kind)
+    pause = case.network
+    assert pause.pause_s > 0.3
+    own_n, ways_m, pauses = [0.0], [0.0], list[float]()
+
+    def take(rehearsal: Rehearsal) -> None:
+        port = rehearsal.tick.couplings[0]
+        assert abs(rehearsal.tick.force_n[0]) <= MAX_FORCE_N
+        own_n.append(port.channels[0].own_n)
+        ways_m.append(abs(rehearsal.tick.motion.velocity_m_per_s[0]) * 1e-3)
+        pauses.append(port.weight)
+
+    run(case, parse_laws("late-cycle", {})[0], take)
+    assert 0.0 in pauses[round(1e3 * pause.pause_at_s) :]
+    followed_m = 1e-3 if kind == "tool" else 0.0  # a target's fastest way
+    for before, now, way_m, last_m in zip(own_n, own_n[1:], ways_m[1:], ways_m, strict=False):
+        ramp_n = 2.0 * MAX_FORCE_N * 1e-3 / 0.05
+        if kind == "tool":  # its spring, and its damper of 2 N s/m
+            most_n = ramp_n + case.stiffness_n_per_m * (way_m + followed_m) + 2.0 * (way_m + last_m + 0.4e-3) / 1e-3
+        else:
+            most_n = ramp_n + MAX_FORCE_N * 1e-3 / BLEND_S
+        assert abs(now - before) <= most_n * (1.0 + 1e-9)
 
 
 def test_a_random_client_is_the_same_anywhere_and_none_is_like_another() -> None:

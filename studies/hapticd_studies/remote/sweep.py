@@ -12,7 +12,7 @@ from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.remote.network import Network
 from hapticd_studies.remote.runs import COLUMNS, Case, draw, run
 
-LAWS = "none,tdpa,ring-damping,energy-cycle"
+LAWS = "none,tdpa,ring-damping,energy-cycle,late-cycle"
 """The laws that are compared, the default of ports last."""
 
 DAMPERS = tuple(f"damper:damping_n_s_per_m={value}" for value in (5, 10, 20, 50, 100))

@@ -52,7 +52,7 @@ MESSAGES = st.lists(
 
 
 @settings(max_examples=8, deadline=None)
-@given(messages=MESSAGES, law=st.sampled_from(["none", "tdpa", "energy-cycle", "ring-damping"]), shake=st.booleans())
+@given(messages=MESSAGES, law=st.sampled_from(["none", "tdpa", "late-cycle", "ring-damping"]), shake=st.booleans())
 def test_each_port_stays_within_its_limit_and_the_books_balance(
     messages: list[tuple[int, str, dict[str, Any]]], law: str, shake: bool
 ) -> None:
@@ -109,7 +109,9 @@ def test_an_object_goes_no_faster_than_its_limit_and_the_books_balance(
     assert rig.unbalanced_j() < 1e-9
 
 
-@pytest.mark.parametrize("law", ["none", "damper", "tdpa", "energy-cycle", "ring-damping", "energy-bounding"])
+@pytest.mark.parametrize(
+    "law", ["none", "damper", "tdpa", "energy-cycle", "late-cycle", "ring-damping", "energy-bounding"]
+)
 def test_every_law_bears_a_target_on_the_device(law: str) -> None:
     """Length 0, in contact: a law that divides by its depth does not find 0 there."""
     rig = Rig(COUPLING, law=law, axes="xyz")

@@ -1,0 +1,172 @@
+"""Energy cycles of what is late: the law of couplings and forces that other programs drive.
+
+As `energy_cycle`, what a swing has generated becomes damping, eqs. 7-9 there, against the ground. What differs is what
+a client does and a wall does not:
+
+    - a spring has a damping of k times 15 ms before anything has swung: a body behind it that has once been thrown
+      about by a delay does not come down again, however much the device is damped then;
+    - what the spring holds at a cycle's end is no gain: its target moves;
+    - each cycle that generates nothing takes a twentieth off, and a spring that comes into force anew begins anew;
+    - the velocity is smoothed, since 0.1 kN s/m on one count of the position is a kick.
+
+docs/couplings.md has the figures.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hapticd.law import Field, LawParams
+from hapticd.tick.energy import CycleFields, cycle_ended
+from hapticd_controllers.felt_mass import FELT_SAMPLES, FeltFields, believe, feel, know_nothing
+
+LEARNED = ("damping_n_s_per_m",)
+RESTS_OUTSIDE = True
+
+LIMIT = 1e12  # a quotient that is kept grows no further, in SI units; what is only summed cannot overflow
+TINY_MOTION = 1e-24  # a cycle with less sum of v^2 dt [m^2/s] is rest: there is nothing to divide by
+WINDOW = 2  # samples of falling, then of rising energy at a cycle's end
+SMALL_COUNTS = 10.0  # a cycle that travels less, in counts of the position, is noise as much as motion
+SMALL_LEAKS = 4.0  # damping at most this many times what was generated in a small cycle
+MEMORY = 0.998  # share of the felt mass's evidence that a new sample leaves standing
+SHARE_OF_MASS = 0.6  # most damping in m/dt: a sampled damper is itself unstable from 2
+LATE_SHARE_OF_MASS = 0.35  # the same where the device applies forces one sample late: from 0.83
+NEW_SPEED = 0.5  # share of the newest sample in the velocity that is damped
+
+
+class Params(LawParams):
+    """How much damping there is before anything is known, and how it goes."""
+
+    base_s: float = Field(
+        0.015, ge=0.0, le=1.0, description="damping of a spring to begin with, as a share of its stiffness [s]"
+    )
+    most_base_n_s_per_m: float = Field(50.0, ge=0.0, le=1e9, description="the most that this comes to [N s/m]")
+    most_unfelt_n_s_per_m: float = Field(
+        100.0, gt=0.0, le=1e9, description="most damping until the mass of the device has been felt [N s/m]"
+    )
+    fall: float = Field(
+        0.05, ge=0.0, le=1.0, description="share of the damping that a cycle which generated nothing takes off"
+    )
+
+
+class State(CycleFields, FeltFields):
+    """What is remembered of one axis of a port."""
+
+    damping_n_s_per_m: float  # in force until the next cycle ends
+    velocity_m_per_s: float  # smoothed
+    energy_j: float  # into the port since the end of the last cycle
+    motion_m2_per_s: float  # sum of v^2 dt since then
+    candidate_motion_m2_per_s: float  # the same at the detector's candidate
+    candidate_stored_j: float  # what the spring held at the candidate
+    stored_j: float  # what it held at the end of the last cycle
+    lowest_m: float  # how far the cycle has travelled, as seen from the target
+    highest_m: float
+    was_in_contact: bool
+    period_s: float  # dt, smoothed: one overrun is not another sampling rate
+    last_port_n: float  # the port's own force, one sample ago
+
+
+def start(state: Any, params: Any, snapshot: Any) -> None:
+    """Take over: damping that was reached and energy that was not dissipated count; a credit does not."""
+    state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
+    state.velocity_m_per_s = 0.0
+    know_nothing(state, False)
+    state.was_in_contact = False
+    _begin(state, snapshot.x_m, min(0.0, -_bounded(snapshot.debt_j)))
+    state.period_s = 0.0
+    state.last_port_n = 0.0
+
+
+def step(state: Any, params: Any, tick: Any) -> float:
+    """The port's own force, less damping.  -> force on the device [N]."""
+    feel(state, tick, MEMORY)
+    if tick.in_contact and not state.was_in_contact and tick.spring_n != 0.0:
+        _begin(state, tick.x_m, 0.0)
+        state.damping_n_s_per_m = 0.0
+    state.was_in_contact = tick.in_contact
+
+    _count_energy(state, tick)
+    ended = cycle_ended(state, state.energy_j, tick.in_contact, WINDOW, WINDOW)
+    if state.window_rises == 0 and (not ended or state.window_minimum_j == state.energy_j):
+        state.candidate_motion_m2_per_s = state.motion_m2_per_s
+        state.candidate_stored_j = 0.5 * abs(tick.x_m * tick.spring_n)
+    if ended:
+        if state.count >= FELT_SAMPLES:
+            believe(state, True)
+        _end_cycle(state, params, tick)
+    _bound(state, params, tick)
+    if not tick.in_contact:
+        state.velocity_m_per_s = 0.0
+        return 0.0
+    state.velocity_m_per_s += NEW_SPEED * (tick.velocity_m_per_s - state.velocity_m_per_s)
+    force_n: float = tick.contact_n - state.damping_n_s_per_m * state.velocity_m_per_s
+    return force_n
+
+
+def _begin(state: Any, x_m: float, energy_j: float) -> None:
+    """Count energy and motion from here."""
+    state.energy_j = energy_j
+    state.window_energy_j = energy_j
+    state.window_minimum_j = 0.0
+    state.window_falls = 0
+    state.window_rises = 0
+    state.motion_m2_per_s = 0.0
+    state.candidate_motion_m2_per_s = 0.0
+    state.candidate_stored_j = 0.0
+    state.stored_j = 0.0
+    state.lowest_m = x_m
+    state.highest_m = x_m
+
+
+def _count_energy(state: Any, tick: Any) -> None:
+    """E(n) = E(n-1) - F(n-1) (x(n) - x(n-1)) of the port's own force, and how far the cycle travels."""
+    port_n = state.last_port_n if state.forces_late else tick.applied_contact_n
+    state.last_port_n = tick.applied_contact_n
+    state.energy_j -= port_n * tick.moved_m
+    if tick.in_contact:
+        state.motion_m2_per_s += tick.velocity_m_per_s * tick.velocity_m_per_s * tick.dt_s
+        state.lowest_m = min(state.lowest_m, tick.x_m)
+        state.highest_m = max(state.highest_m, tick.x_m)
+
+
+def _end_cycle(state: Any, params: Any, tick: Any) -> None:
+    """What was generated becomes damping; then energies count from here."""
+    generated_j = state.candidate_stored_j - state.stored_j - state.window_minimum_j
+    motion = state.candidate_motion_m2_per_s
+    if motion > TINY_MOTION:
+        missing = _bounded(generated_j / motion)  # eq. 8
+        if missing > 0.0 and state.highest_m - state.lowest_m < SMALL_COUNTS * tick.resolution_m:
+            missing = max(0.0, min(missing, SMALL_LEAKS * missing - state.damping_n_s_per_m))
+        if missing > 0.0:
+            state.damping_n_s_per_m += missing
+        else:
+            state.damping_n_s_per_m *= 1.0 - params.fall
+    state.energy_j -= state.window_minimum_j
+    state.window_energy_j -= state.window_minimum_j
+    state.window_minimum_j = 0.0
+    state.stored_j = state.candidate_stored_j
+    state.motion_m2_per_s -= motion
+    state.candidate_motion_m2_per_s = 0.0
+    state.lowest_m = tick.x_m
+    state.highest_m = tick.x_m
+
+
+def _bound(state: Any, params: Any, tick: Any) -> None:
+    """No less than the spring's base, and no more than the device bears."""
+    if state.period_s == 0.0:
+        state.period_s = tick.dt_s
+    state.period_s += 0.01 * (tick.dt_s - state.period_s)
+    most: float = params.most_unfelt_n_s_per_m
+    if state.felt_mass_kg > 0.0:
+        share = LATE_SHARE_OF_MASS if state.forces_late else SHARE_OF_MASS
+        most = share * state.felt_mass_kg / state.period_s
+    state.damping_n_s_per_m = min(state.damping_n_s_per_m, most)
+    if tick.in_contact and tick.spring_n != 0.0:
+        base = min(params.most_base_n_s_per_m, params.base_s * _bounded(tick.spring_n / -tick.x_m))
+        state.damping_n_s_per_m = max(state.damping_n_s_per_m, base)
+
+
+def _bounded(value: float) -> float:
+    if -LIMIT < value < LIMIT:
+        return value
+    return LIMIT if value > 0.0 else -LIMIT

@@ -1,0 +1,135 @@
+"""`late-cycle`: what the law of ports knows beforehand, learns, forgets, and holds."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
+from hapticd_controllers import late_cycle, none
+from hapticd_controllers.late_cycle import Params
+
+DT_S = 1e-3
+
+
+class Port:
+    """A law on one axis of a port, and the tick that it is shown."""
+
+    def __init__(self, law: Any = late_cycle, params: Any = None) -> None:
+        self.law = law
+        self.params = plain_object("Params", scalar_params(params or law.Params()))
+        self.state = fresh_state(law)
+        self.tick = LawTick(1e-5)
+        law.start(self.state, self.params, LawSnapshot())
+
+    def go(self, moved_m: float, port_n: float, stiffness_n_per_m: float = 0.0, x_m: float = -1e-15) -> float:
+        """A sample later: how far it has moved, and the port's own force; the force of both."""
+        tick = self.tick
+        tick.moved_m, tick.velocity_m_per_s, tick.x_m = moved_m, moved_m / DT_S, x_m
+        tick.in_contact = True
+        tick.spring_n, tick.contact_n = -stiffness_n_per_m * x_m, port_n
+        force_n: float = self.law.step(self.state, self.params, tick)
+        tick.applied_n, tick.applied_contact_n = force_n, port_n
+        return force_n
+
+    def leave(self) -> None:
+        """Be out of force for two samples."""
+        self.tick.in_contact, self.tick.spring_n, self.tick.contact_n, self.tick.moved_m = False, 0.0, 0.0, 0.0
+        for _ in range(2):
+            assert self.law.step(self.state, self.params, self.tick) == 0.0
+            self.tick.applied_n = self.tick.applied_contact_n = 0.0
+
+    @property
+    def damping(self) -> float:
+        return float(self.state.damping_n_s_per_m)
+
+    def swing(self, given_n_s_per_m: float, times: int = 1, stiffness_n_per_m: float = 0.0) -> list[float]:
+        """Swings on a spring of 3 kN/m that gives as a negative damper of so much would; each damping that followed."""
+        found = []
+        x_m = 0.0
+        for at in range(80 * times):
+            way_m = -1e-4 if 20 <= at % 80 < 60 else 1e-4
+            x_m += way_m
+            before = self.damping
+            self.go(way_m, -3000.0 * x_m + given_n_s_per_m * way_m / DT_S, stiffness_n_per_m, x_m - 5e-6)
+            if self.damping != before:
+                found.append(self.damping)
+        return found
+
+
+def rests_m(law: Any, stiffness_n_per_m: float, late: int) -> float:
+    """How far a device of 0.3 kg and 5 N s/m swings in the end on a spring that comes so many ticks late, as forces."""
+    port = Port(law)
+    heard = deque([0.0] * late, maxlen=late)
+    x_m = v_m_per_s = 0.0
+    path = []
+    for _ in range(4000):
+        before_m = x_m
+        force_n = port.tick.applied_n
+        for _ in range(10):
+            v_m_per_s += (force_n - 3.0 - 5.0 * v_m_per_s) / 0.3 * DT_S / 10
+            x_m += v_m_per_s * DT_S / 10
+        port_n = max(-12.0, min(12.0, heard[0]))
+        heard.append(-stiffness_n_per_m * x_m)
+        port.go(x_m - before_m, port_n)
+        path.append(x_m)
+    return max(path[-300:]) - min(path[-300:])
+
+
+def test_a_spring_is_damped_before_anything_has_swung_and_a_force_is_not() -> None:
+    for stiffness_n_per_m, base in ((200.0, 3.0), (2000.0, 30.0), (8000.0, 50.0)):
+        port = Port()
+        port.go(0.0, 0.0, stiffness_n_per_m)
+        assert port.damping == pytest.approx(base)
+    port = Port()
+    port.go(0.0, 3.0)
+    assert port.damping == 0.0
+
+
+def test_what_the_port_has_given_in_each_half_swing_is_added_to_the_damping() -> None:
+    """And k dt / 2 of its spring, which is sampled."""
+    port = Port()
+    dampings = port.swing(8.0, times=3)
+    assert len(dampings) >= 4
+    given = 8.0 + 0.5 * 3000.0 * DT_S
+    assert [b - a for a, b in pairwise(dampings)] == [pytest.approx(given, rel=0.25)] * (len(dampings) - 1)
+
+
+def test_each_half_swing_that_gives_nothing_takes_off_a_twentieth() -> None:
+    port = Port()
+    port.swing(8.0, times=3)
+    dampings = port.swing(-12.0, times=6)[2:]
+    assert len(dampings) >= 8
+    assert [b / a for a, b in pairwise(dampings)] == [pytest.approx(0.95)] * (len(dampings) - 1)
+    kept = Port(params=Params(fall=0.0))
+    kept.swing(8.0, times=3)
+    assert kept.swing(-12.0, times=6)[2:] == []
+
+
+def test_a_spring_that_comes_into_force_anew_begins_anew_and_a_force_goes_on() -> None:
+    spring, force = Port(), Port()
+    spring.swing(20.0, times=3, stiffness_n_per_m=300.0)
+    force.swing(20.0, times=3)
+    for port, stiffness_n_per_m in ((spring, 300.0), (force, 0.0)):
+        assert port.damping > 50.0
+        port.leave()
+        port.go(0.0, 0.0, stiffness_n_per_m)
+    assert spring.damping == pytest.approx(0.015 * 300.0)
+    assert force.damping > 50.0
+
+
+def test_one_count_of_the_position_kicks_by_half_of_what_it_would() -> None:
+    port = Port()
+    port.go(0.0, 0.0, 2000.0)
+    assert port.go(1e-5, 0.0, 2000.0) == pytest.approx(-0.5 * 30.0 * 1e-2)
+
+
+@pytest.mark.parametrize("late", [10, 40, 80])
+def test_a_spring_that_comes_late_is_held(late: int) -> None:
+    """Without a law it swings by centimetres from (5 N s/m) / delay on; here it has four times that."""
+    stiffness_n_per_m = 4.0 * 5.0 / (late * DT_S)
+    assert rests_m(none, stiffness_n_per_m, late) > 5e-3
+    assert rests_m(late_cycle, stiffness_n_per_m, late) < 5e-5
