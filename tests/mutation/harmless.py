@@ -19,6 +19,10 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "controllers/hapticd_controllers/tdpa.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
         "controllers/hapticd_controllers/energy_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
         "controllers/hapticd_controllers/energy_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
+        "controllers/hapticd_controllers/felt_mass.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/felt_mass.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
+        "controllers/hapticd_controllers/late_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/late_cycle.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
         "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",
         "controllers/hapticd_controllers/ring_damping.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 1 is LtE]",
         "controllers/hapticd_controllers/tdpa.py: step: if not params.carry_debt and state.energy_j < "
