@@ -80,6 +80,7 @@ def test_records_come_out_as_they_went_in_and_once(shared: SharedMemory) -> None
     write(shared, 1)
     assert [record.seq for record in reader.read()] == [30]
     assert reader.dropped == 0
+    assert reader.fetched == 31
 
 
 def test_a_read_can_be_bounded(shared: SharedMemory) -> None:

@@ -60,9 +60,14 @@ def told(started: Started, code: EventCode) -> list[LoopEvent]:
     return [event for event in started.told if event.code == code]
 
 
-def test_a_supervisor_that_shows_no_sign_of_life_is_told_each_time_and_costs_the_force(clock: Clock) -> None:
+@pytest.mark.parametrize("before_s", [1.0, 0.1], ids=["from the start", "after a switch"])
+def test_a_supervisor_that_shows_no_sign_of_life_is_told_each_time_and_costs_the_force(
+    clock: Clock, before_s: float
+) -> None:
     """After the very time that is set for it, and not at the first tick that has waited for so long."""
-    started = Started(clock, text=WALL + "[safety]\nsupervisor_stall_s = 1.0\n")
+    text = LAW + "[safety]\nsupervisor_stall_s = {}\n"
+    started = Started(clock, text=text.format(before_s))
+    started.loop.requests.know("none", plugins.law("none"))
     silent = [range(100, 1400), range(1500, 2700)]
     latched: list[int] = []
 
@@ -71,6 +76,8 @@ def test_a_supervisor_that_shows_no_sign_of_life_is_told_each_time_and_costs_the
             started.shared.words[SUPERVISOR_BEAT] = clock.now_ns
         if started.tick.guard.latched:
             latched.append(number)
+        if number == 20 and before_s != 1.0:
+            started.shared.post(switch_request(started.config, parse(text.format(1.0), "patient")))
         if number == 1450:
             started.tick.guard.clear()
             started.loop.session.arm()
@@ -101,6 +108,7 @@ def test_a_loop_that_misses_fifty_more_deadlines_than_it_meets_lets_go(clock: Cl
     (event,) = late(clock, [1000, 1001, 1002, 1003, 1004])
     assert event.text == "50 more deadlines were missed than met"
     assert event.seq == 1005
+    assert event.deadline_ns % 1_000_000 == 0, "it is that of its tick"
     assert late(clock, [1000, 1001, 1002, 1003, 1005]) == []
     (event,) = late(clock, [1000, 1001, 1002, 1003, 1005, 1007])
     assert event.text == "58 more deadlines were missed than met"

@@ -49,11 +49,15 @@ class Reach:
 
 
 class Follower:
-    """A plugin of pytest: notes which lines each test comes by.
+    """A plugin of pytest: notes which lines are run as tests are read, and which each test comes by.
 
     Args:
         tree: the root of the copy of the tree.
         files: of the room, below it.
+
+    Attributes:
+        reach: what was noted.
+        follows: whether tests are followed.
     """
 
     def __init__(self, tree: Path, files: Collection[str]) -> None:
@@ -63,16 +67,20 @@ class Follower:
         self._lines = self.reach.of_all
         self._test = ""
         self._calls = 0
+        self.follows = False
         sys.addaudithook(self._hear)
-        threading.settrace(self._enter)
-        sys.settrace(self._enter)
+        if files:
+            sys.settrace(self._enter)
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
         """Follow this test, with what it sets up and clears away."""
+        if not self.follows:
+            return (yield)
         self._test = item.nodeid
         self._lines = self.reach.lines[item.nodeid]
         self._calls = 0
+        threading.settrace(self._enter)
         sys.settrace(self._enter)
         try:
             return (yield)

@@ -79,7 +79,8 @@ ROOMS = {
         tuple(
             f"tests/loop/test_{name}.py"
             for name in (
-                "start", "budget", "loop", "requests", "disarming", "leaving", "memory", "ramps", "any_order_mutants",
+                "start", "budget", "watching", "loop", "requests", "disarming", "leaving", "memory", "ramps",
+                "any_order_mutants",
             )
         ),
     ),

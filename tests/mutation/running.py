@@ -11,60 +11,30 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import multiprocessing
 import os
 import random
 import shutil
-import signal
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from multiprocessing.connection import Connection
+from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
-from typing import cast
-
-import pytest
 
 from tests.mutation.harmless import HARMLESS
-from tests.mutation.order import Experience, InOrder, Told
-from tests.mutation.reach import Follower, Reach, file_of
+from tests.mutation.order import Experience
+from tests.mutation.reach import Reach
 from tests.mutation.rooms import ROOMS, Room
 from tests.mutation.slips import Slip, slips
+from tests.mutation.warm import SOURCES, Task, Told, Warm
 
 ROOT = Path(__file__).parents[2]
-SOURCES = ("hapticd", "drivers", "controllers", "studies", "benchmarks", "views")
 COPIED = (*SOURCES, "tests", "config", "docs", "systemd", "pyproject.toml", "README.md", "CHANGELOG.md", "Makefile")
 PARALLEL = 2
-LIKELIEST = 30
-"""So many tests run before the others are read."""
-
 LEAST_S = 60.0
 """Shortest time limit of a run [s]; a run that takes longer than five times that of the tree as it is has noticed."""
-
-_PRELOADED = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
-_FORKS = multiprocessing.get_context("forkserver")  # what takes long to import, and is in no tree, is imported once
-_FORKS.set_forkserver_preload(["pytest", "hypothesis", "numpy", "numba", "pydantic", "tomlkit", "msgpack", "zmq"])
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """What a process does that runs tests.
-
-    Attributes:
-        arguments: of pytest.
-        known: of the tests.
-        order: those that are to run; none: all.
-        follow: files whose lines are noted, test by test.
-    """
-
-    arguments: tuple[str, ...]
-    known: Experience
-    order: Sequence[str] = ()
-    follow: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,30 +89,41 @@ def judge(
         RuntimeError: the tests fail on the tree as it is.
     """
     known = Experience()
-    with tempfile.TemporaryDirectory(prefix="mutation-") as place:
-        tree = _copy(Path(place) / "0")
-        known.reach = _followed(tree, room, known)
-        started_s = time.monotonic()
-        known.took_s = _without_slip(tree, room, known)
-        limit_s = max(LEAST_S, 5.0 * (time.monotonic() - started_s))
-        free: SimpleQueue[Path] = SimpleQueue()
-        free.put(tree)
-        for number in range(1, parallel):
-            free.put(shutil.copytree(tree, Path(place) / str(number)))
+    with contextlib.ExitStack() as stack:
+        place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mutation-")))
+        tree = _copy(place / "0")
+        with Warm(tree, room.asked, room.files) as warm:
+            started_s = time.monotonic()
+            known.took_s, known.reach = _without_slip(warm, room)
+            limit_s = max(LEAST_S, 5.0 * (time.monotonic() - started_s))
+        trees = [tree, *(shutil.copytree(tree, place / str(number)) for number in range(1, parallel))]
+        free: SimpleQueue[tuple[Path, Warm]] = SimpleQueue()
+        for each in trees:
+            free.put((each, stack.enter_context(Warm(each, room.asked))))
 
         def survives(slip: Slip) -> bool:
-            mine = free.get()
+            mine, warm = free.get()
             file = mine / slip.file
             source, stamp = file.read_text(), file.stat()
             try:
                 file.write_text(slip.into(source))
-                lives = _lives(mine, known, known.order({(slip.file, line) for line in slip.lines(source)}), limit_s)
+                lines = {(slip.file, line) for line in slip.lines(source)}
+                tests = known.order(lines)
+                task = Task(known.limits_s(tests), limit_s, swapped=(slip.file, source))
+                told: Told | None = Told(unfit=bool(tests))
+                if lines and not lines & known.reach.of_all and tests:
+                    told = warm.run(task)
+                if told is not None and told.unfit:
+                    with Warm(mine, room.asked) as anew:
+                        told = anew.run(replace(task, swapped=("", "")))
+                lives = told is not None and not told.failed
+                known.noticed.update(told.failed[:1] if told else ())
                 progress(slip, lives)
                 return lives
             finally:
                 file.write_text(source)
                 os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))  # its bytecode is good once more
-                free.put(mine)
+                free.put((mine, warm))
 
         with ThreadPoolExecutor(parallel) as pool:
             alive = [slip for slip, lives in zip(chosen, pool.map(survives, chosen), strict=True) if lives]
@@ -166,74 +147,16 @@ def _copy(to: Path) -> Path:
     return to
 
 
-def _followed(tree: Path, room: Room, known: Experience) -> Reach:
-    """What the tests of a room come by; to be followed makes them slow, so what they find is not asked."""
-    told = _run(tree, Task(room.asked, known, follow=room.files), 3600.0)
-    if told is None or told.reach is None or not told.reach.lines:
+def _without_slip(warm: Warm, room: Room) -> tuple[dict[str, float], Reach]:
+    """How long each test takes on the tree as it is [s], and what it comes by."""
+    told = warm.run(Task(until_one_fails=False, follow=True))
+    if told is None or told.reach is None or not told.took_s:
         raise RuntimeError(f"cannot be followed: {' '.join(room.tests)}")
-    return told.reach
-
-
-def _without_slip(tree: Path, room: Room, known: Experience) -> dict[str, float]:
-    """How long each test takes on the tree as it is, in the order in which they run on one that has a slip [s]."""
-    told = _run(tree, Task((*room.asked, "-x"), known, known.order()), 3600.0)
-    if told is None or told.failed or not told.took_s:
-        failed = " ".join(told.failed if told else room.tests)
-        raise RuntimeError(f"fails without any slip: {failed}")
-    return told.took_s
-
-
-def _lives(tree: Path, known: Experience, order: Sequence[str], limit_s: float) -> bool:
-    """Whether no test notices; those that are likeliest to run alone, since reading all the others takes its time."""
-    for names in (order[:LIKELIEST], order[LIKELIEST:]):
-        if names:
-            told = _run(tree, Task(("-x", *dict.fromkeys(map(file_of, names))), known, names), limit_s)
-            known.noticed.update(told.failed[:1] if told else ())
-            if told is None or told.failed:
-                return False
-    return True
-
-
-def _run(tree: Path, task: Task, limit_s: float) -> Told | None:
-    """Run tests on a tree; None where that ended early or took longer than the limit."""
-    hearing, telling = _FORKS.Pipe(duplex=False)
-    running = _FORKS.Process(target=_run_tests, args=(tree, task, telling))
-    running.start()
-    telling.close()
-    with hearing, contextlib.suppress(EOFError):
-        told: Told | None = hearing.recv() if hearing.poll(limit_s) else None
-        running.join(limit_s if told else 0.0)
-        if running.exitcode in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
-            return told
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(cast("int", running.pid), signal.SIGKILL)
-    running.kill()
-    running.join()
-    return None
-
-
-def _run_tests(tree: Path, task: Task, telling: Connection) -> None:
-    """What a process does that was forked for it: nothing of the tree has been imported yet."""
-    os.setsid()
-    os.chdir(tree)
-    paths = [str(tree / source) for source in ("", *SOURCES[1:])]
-    sys.path[:0] = paths
-    no_bytecode = not task.follow  # what is on the tree as it is stays good for those with a slip
-    os.environ |= {
-        "PYTHONPATH": os.pathsep.join(paths),
-        "PYTHONDONTWRITEBYTECODE": "1" if no_bytecode else "",
-        "CI": "false",
-    }
-    sys.dont_write_bytecode = no_bytecode
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), 1)
-        os.dup2(nowhere.fileno(), 2)
-    loaded = [name for name in sys.modules if name.startswith("hapticd")]
-    assert not loaded, loaded
-    follower = Follower(tree, task.follow) if task.follow else None
-    plugins = [InOrder(task.known, task.order, follower, telling), *([follower] if follower else [])]
-    arguments = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-W", _PRELOADED, *task.arguments)
-    os._exit(pytest.main(list(arguments), plugins))
+    # To be followed makes a test slow, which one that compares costs may not pass.
+    again = warm.run(Task(dict.fromkeys(told.failed, 0.0))) if told.failed else Told()
+    if again is None or again.failed:
+        raise RuntimeError(f"fails without any slip: {' '.join(again.failed if again else told.failed)}")
+    return told.took_s, told.reach
 
 
 def _tell(slip: Slip, lives: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import os
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from tests.mutation.harmless import EQUAL
 from tests.mutation.rooms import LAWS, ROOMS, Room
 from tests.mutation.running import ROOT, judge, sample, told
 from tests.mutation.slips import slips
+from tests.mutation.warm import swap
 
 SEED = int(os.environ.get("SEED", "1"))
 NIGHTLY_SLIPS = 40
@@ -25,10 +27,11 @@ QUICK = {
 
 @pytest.mark.parametrize("name", QUICK)
 def test_every_slip_of_a_small_sample_is_found(name: str) -> None:
-    """Six of each, always the same ones, by the tests of the module alone."""
+    """Six of each, always the same ones, by the tests of the module alone; the one that changes nothing lives."""
     verdict = judge(QUICK[name], sample(QUICK[name], 6, seed=4))
     assert verdict.made == 6
     assert not verdict.survivors, told(verdict.survivors)
+    assert len(verdict.harmless) == 1
 
 
 @pytest.mark.nightly
@@ -80,3 +83,16 @@ def test_a_file_has_the_slips_of_its_functions_and_numbers(tmp_path: Path) -> No
         mutant = slip.into(SOURCE)
         assert mutant != ast.unparse(ast.parse(SOURCE)) + "\n"
         assert len([line for line in slip.diff(SOURCE).splitlines() if line.startswith(("-", "+"))]) >= 3
+
+
+def test_what_has_been_imported_gets_the_code_of_a_slip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Under whatever name it is known, and in a class."""
+    file = tmp_path / "swapped_one.py"
+    file.write_text("class A:\n    def twice(self, x):\n        return 2 * x\n\ndef once(x):\n    return x\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    module = importlib.import_module("swapped_one")
+    once, a = module.once, module.A()
+    before = file.read_text()
+    file.write_text(before.replace("2 * x", "3 * x").replace("    return x", "    return -x"))
+    swap(file, before)
+    assert (once(1), a.twice(1)) == (-1, 3)
