@@ -7,13 +7,14 @@ import math
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
 
 import pytest
 
 from hapticd import plugins
-from hapticd.config.loading import LoadedConfig, parse
+from hapticd.config.loading import LoadedConfig, load, parse
 from hapticd.device import Sample
 from hapticd.supervisor.reload import switch_request
 from hapticd.tick.event import EventCode
@@ -233,3 +234,18 @@ def test_a_law_that_cannot_be_imported_is_an_answer(bench: Bench) -> None:
     assert "tests.no_such_law" in bench.ask(**request)
     assert bench.tick.contacts[0].law.module.__name__ == "hapticd_controllers.ring_damping"
     assert bench.ask(do="arm") == ""
+
+
+def test_objects_come_in_by_a_switch_and_a_mesh_is_read_beside_the_loop() -> None:
+    ball, mesh = (load(Path(__file__).parents[2] / "config" / name) for name in ("ball.toml", "mesh.toml"))
+    read_in: list[str] = []
+    bench = Bench(ball)
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("hapticd.loop.requests.field_of", lambda _: read_in.append(threading.current_thread().name))
+            assert bench.ask(**switch_request(ball, mesh)) == ""
+        assert len(read_in) == 1
+        assert read_in != [threading.current_thread().name]
+        assert bench.told()[EventCode.SWITCHED].fields["config"] == mesh.hash
+    finally:
+        bench.close()
