@@ -6,6 +6,7 @@ from collections.abc import Collection
 
 import pytest
 
+from hapticd.config.models import LoopConfig
 from hapticd.loop.loop import BUDGET_MISSES, BUDGET_TICKS
 from hapticd.loop.memory import SUPERVISOR_BEAT
 from hapticd.tick.event import EventCode
@@ -16,8 +17,13 @@ FIRST = 20
 """The first tick that takes long: from there on it is asked how long ticks compute."""
 
 
-def fails(monkeypatch: pytest.MonkeyPatch, long: Collection[int], computes: bool = True) -> bool:
-    """Whether the law fails when these ticks after the first one take 0.6 ms of 1 ms, and compute for it or wait."""
+def fails(
+    monkeypatch: pytest.MonkeyPatch, long: Collection[int], computes: bool = True, before_s: float = 0.1e-3
+) -> bool:
+    """Whether the law fails when these ticks after the first one take 0.6 ms of 1 ms, and compute for it or wait.
+
+    All others take 0.1 ms, but for one before the first.
+    """
     clock = Clock(monkeypatch)
     clock.computed_ns = 0
     started = Started(clock)
@@ -25,7 +31,7 @@ def fails(monkeypatch: pytest.MonkeyPatch, long: Collection[int], computes: bool
     def each_tick(number: int) -> None:
         started.shared.words[SUPERVISOR_BEAT] = clock.now_ns
         duration_s = 0.6e-3 if number - FIRST in {0, *long} else 0.1e-3
-        started.driver.before_read = lambda: spend(duration_s)
+        started.driver.before_read = lambda: spend(before_s if number == FIRST - 10 else duration_s)
 
     def spend(duration_s: float) -> None:
         clock.pass_s(duration_s)
@@ -56,3 +62,9 @@ def test_the_first_only_has_it_asked_and_ten_ticks_later_that_is_forgotten(monke
 
 def test_a_tick_that_waits_for_its_device_has_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not fails(monkeypatch, range(1, 30), computes=False)
+
+
+def test_a_tick_that_takes_the_very_budget_is_not_long_and_has_nothing_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    budget_s = LoopConfig().law_budget * 1e-3
+    assert not fails(monkeypatch, [1, 2], before_s=budget_s)
+    assert fails(monkeypatch, [1, 2], before_s=budget_s + 1e-6)

@@ -9,6 +9,7 @@ import time
 from collections.abc import Generator
 from pathlib import Path
 
+import msgpack
 import pytest
 
 from hapticd.config.walls import MAX_WALLS
@@ -247,6 +248,15 @@ def test_a_letter_is_read_answered_and_its_verdict_read(shared: SharedMemory) ->
     shared.answer("")
     assert shared.words[ANSWERED] == 1
     assert shared.verdict() == ""
+
+
+def test_a_letter_of_262144_bytes_fits_and_no_longer_one(shared: SharedMemory) -> None:
+    fits = {"do": "x" * ((1 << 18) - len(msgpack.packb({"do": "x" * 70_000, "disarm": 0})) + 70_000)}
+    with pytest.raises(HapticdError, match="262145 bytes long, 262144 fit"):
+        shared.post({"do": fits["do"] + "x"})
+    assert shared.words[REQUESTS] == 0
+    shared.post(fits)
+    assert shared.request() == fits | {"disarm": 0}
 
 
 def test_a_second_letter_waits_for_the_answer_to_the_first(shared: SharedMemory) -> None:

@@ -95,6 +95,20 @@ def test_a_calibration_forgets_the_origin_since_the_device_may_count_from_elsewh
     assert bench.tick.motion.position_m == pytest.approx([0.02])
 
 
+def test_a_switch_counts_laws_and_says_what_becomes_of_the_one_before(bench: Bench) -> None:
+    bench.ticks(1)
+    none = "[controller]\nlaw = 'none'\n"
+    wanted, softer = configured(WALLS + none), configured(WALLS.replace("12000.0", "9000.0") + none)
+    assert bench.ask(**switch_request(START, wanted)) == ""
+    law = bench.tick.contacts[0].law
+    assert bench.told()[EventCode.SWITCHED].text == f"configuration {wanted.hash}: law ring-damping -> none"
+    assert bench.loop.session.law_count == 1
+    assert bench.ask(**switch_request(wanted, softer)) == ""
+    assert bench.told()[EventCode.SWITCHED].text == f"configuration {softer.hash}: law none goes on"
+    assert bench.loop.session.law_count == 1
+    assert bench.tick.contacts[0].law is law
+
+
 def test_a_switch_that_is_refused_leaves_law_scene_and_limits_as_they_were(bench: Bench) -> None:
     bench.ticks(1)
     request = switch_request(START, configured("[controller]\nlaw = 'tdpa'\n[safety]\nramp_s = 0.2\n"))
