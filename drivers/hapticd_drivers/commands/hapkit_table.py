@@ -39,6 +39,7 @@ def hapkit_table(
     from hapticd.replacing import write as replace
     from hapticd_drivers.rig.angle_table import ENOUGH_PASSES
     from hapticd_drivers.rig.board_header import read_table, table_line, with_table
+    from hapticd_drivers.rig.serial_ports import choose
     from hapticd_drivers.rig.swinging import measure
 
     if write and board is None:
@@ -49,12 +50,13 @@ def hapkit_table(
         before = read_table(text)
     except (OSError, UnicodeDecodeError, ConfigError) as error:
         raise ConfigError(f"{header}: {error}") from None
+    where = choose(port)
     typer.echo(
         "The motor gets no force. Switch its supply off, take the handle, and swing it to and fro over its", err=True
     )
     typer.echo("whole travel, about twice a second, without stopping on the way, until the bar is full.", err=True)
     with progress_bar(ENOUGH_PASSES, "half turns") as tell:
-        found = measure(port, baud, before, longest, lambda more: tell(advance=more))
+        found = measure(where, baud, before, longest, lambda more: tell(advance=more))
     if write:
         replace(header, with_table(text, found.nodes).encode())
     if as_json:
@@ -66,5 +68,5 @@ def hapkit_table(
         f"off by up to {found.uneven_counts:.1f}",
         err=True,
     )
-    where = f"written to {header}" if write else "put this line into board.h"
-    typer.echo(f"{where}; then: make BOARD=hapkit flash, hapticd calibrate", err=True)
+    done = f"written to {header}" if write else "put this line into board.h"
+    typer.echo(f"{done}; then: make BOARD=hapkit flash, hapticd calibrate", err=True)

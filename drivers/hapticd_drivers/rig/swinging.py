@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable, Sequence
 
 from hapticd.errors import ConfigError, HapticdError
-from hapticd_drivers.rig import serial_ports
 from hapticd_drivers.rig.angle_table import ENOUGH_PASSES, AngleTable, Swings
 from hapticd_drivers.rig.conversation import Conversation
 from hapticd_drivers.rig.metrics import METRICS
 from hapticd_drivers.rig.serial_link import SerialLink
+from hapticd_drivers.rig.serial_ports import Port
 
 MODEL = "hapkit"
 USABLE_ERROR = 3.0
@@ -19,11 +19,13 @@ USABLE_ERROR = 3.0
 _LOOK_EVERY = 50
 
 
-def measure(port: str, baud: int, before: Sequence[int], longest_s: float, told: Callable[[float], None]) -> AngleTable:
+def measure(
+    port: Port, baud: int, before: Sequence[int], longest_s: float, told: Callable[[float], None]
+) -> AngleTable:
     """Read positions until the table is good, or for so long.
 
     Args:
-        port: as `device.options.port`.
+        port: of the board.
         baud: bits a second.
         before: the table that the board was flashed with.
         longest_s: after which what is known has to do [s].
@@ -34,7 +36,7 @@ def measure(port: str, baud: int, before: Sequence[int], longest_s: float, told:
         DriverError: the rig cannot be reached.
         HapticdError: too little is known for a table.
     """
-    link = SerialLink(serial_ports.choose(port), baud, low_latency=True)
+    link = SerialLink(port, baud, low_latency=True)
     try:
         talk = Conversation(link, _Counts(), "serial-rig")
         model = talk.greet().model
