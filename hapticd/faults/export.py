@@ -70,7 +70,7 @@ def _space_names(near: int) -> Iterator[str]:
     for at in range(near):
         yield from (f"{name}[object {at}]" for name in ("index", *_WALL_FIELDS))
         yield from (f"{name}[object {at}][{axis}]" for name in _OBJECT_VECTORS for axis in range(3))
-        yield from (f"{name}[object {at}]" for name in ("depth_m", "sliding"))
+        yield from (f"{name}[object {at}]" for name in ("depth_m", "sliding", "carrier", "inside"))
 
 
 def _space_values(space: SpaceRecord | None, near: int) -> Iterator[object]:
@@ -82,8 +82,8 @@ def _space_values(space: SpaceRecord | None, near: int) -> Iterator[object]:
         yield one.index
         yield from (int(value) if isinstance(value, bool) else value for value in dataclasses.astuple(one.contact))
         yield from (value for name in _OBJECT_VECTORS for value in getattr(one, name))
-        yield from (one.depth_m, int(one.sliding))
-    yield from [""] * ((near - len(shown)) * (len(_WALL_FIELDS) + 12))
+        yield from (one.depth_m, int(one.sliding), one.carrier, " ".join(map(str, one.inside)))
+    yield from [""] * ((near - len(shown)) * (len(_WALL_FIELDS) + 14))
 
 
 def _port_names(ports: int, axes: int) -> Iterator[str]:

@@ -227,6 +227,29 @@ class Proxy(ProxyScalars):
             self.reach_limit = outer_m * outer_m - (x * x + y * y + z * z)
 
 
+def part_distance(proxy: Proxy, at: int, x: float, y: float, z: float) -> float:
+    """How far away one shape of a solid is from a point in the frame of the first one, < 0 inside [m].
+
+    Args:
+        proxy: of the solid.
+        at: which of its `others`; -1: the first shape.
+        x: the point, with y and z [m].
+        y: see x.
+        z: see x.
+    """
+    shape: Part | Proxy = proxy
+    if at >= 0:
+        shape = part = proxy.others[at]
+        x, y, z = x - part.px, y - part.py, z - part.pz
+        if part.turned:
+            x, y, z = (
+                part.xx * x + part.yx * y + part.zx * z,
+                part.xy * x + part.yy * y + part.zy * z,
+                part.xz * x + part.yz * y + part.zz * z,
+            )
+    return shape_distance(shape, proxy.voxels, x, y, z)[0]
+
+
 def group(shapes: Sequence[Placed], keys: Sequence[Hashable]) -> list[list[int]]:
     """Which shapes make one solid: those of one key that overlap, straight or through others.
 

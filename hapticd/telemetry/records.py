@@ -107,6 +107,9 @@ class Touch:
         depth_m: how far that was [m].
         force_n: force that it applied to the device [N].
         sliding: whether friction slipped.
+        carrier: of the objects that overlap and are one solid, the one that carried the force: `object` is the first of
+            them. -1 from a daemon that does not tell.
+        inside: those of them that the device was in.
         invalid: a value was not finite and stands here as 0.
     """
 
@@ -120,6 +123,8 @@ class Touch:
     depth_m: float
     force_n: tuple[float, ...]
     sliding: bool
+    carrier: int = -1
+    inside: tuple[int, ...] = ()
     invalid: bool = False
 
 

@@ -196,6 +196,8 @@ def contact_maps(record: TickRecord, timestamp: float) -> list[Map]:
                 "depth_m": one.depth_m,
                 "force_n": one.force_n,
                 "sliding": one.sliding,
+                "carrier": one.carrier,
+                "inside": one.inside,
             }
         )
         for one in record.space.near

@@ -54,6 +54,8 @@ class ObjectRecord:
         depth_m: how far that is [m].
         force_n: force that it applies to the device [N].
         sliding: whether friction slips.
+        carrier: of the objects that are one solid, the one on whose surface the proxy is.
+        inside: of these, those that the device is in.
     """
 
     index: int
@@ -63,6 +65,8 @@ class ObjectRecord:
     depth_m: float
     force_n: tuple[float, ...]
     sliding: bool
+    carrier: int
+    inside: tuple[int, ...]
 
 
 @dataclass(slots=True)
@@ -89,7 +93,7 @@ CODES = {"int": "q", "bool": "q", "float": "d"}
 
 WALL = "".join(CODES[str(field.type)] for field in fields(WallRecord))
 SPACE = "qddd"
-OBJECT = f"q{WALL}ddddddddddq"
+OBJECT = f"q{WALL}ddddddddddqqQ"
 """How `struct` writes what the records above have."""
 
 
@@ -110,11 +114,16 @@ def contact_values(contact: Contact, stiffness_n_per_m: float, ledger: EnergyLed
 
 def object_values(contact: SolidContact, x: float, y: float, z: float) -> tuple[float, ...]:
     """The fields of `ObjectRecord`, with the device at a point of the world."""
-    proxy = contact.solid.proxy
+    solid = contact.solid
+    proxy = solid.proxy
     depth_m = contact.depth_m
+    carrier = solid.index
+    inside = 1 << carrier if depth_m > 0.0 else 0
+    if len(solid.members) > 1 and depth_m > 0.0:
+        carrier, inside = solid.shares(x, y, z)
     return (
-        contact.solid.index,
-        *contact_values(contact.normal, contact.solid.stiffness_n_per_m, contact.ledger),
+        solid.index,
+        *contact_values(contact.normal, solid.stiffness_n_per_m, contact.ledger),
         x + depth_m * proxy.normal_x + proxy.stretch_x,
         y + depth_m * proxy.normal_y + proxy.stretch_y,
         z + depth_m * proxy.normal_z + proxy.stretch_z,
@@ -124,6 +133,8 @@ def object_values(contact: SolidContact, x: float, y: float, z: float) -> tuple[
         depth_m,
         *contact.force,
         proxy.sliding,
+        carrier,
+        inside,
     )
 
 
@@ -154,6 +165,8 @@ def space_record(values: Sequence[Any]) -> SpaceRecord:
                 where[6],
                 tuple(where[7:10]),
                 bool(where[10]),
+                where[11],
+                tuple(index for index in range(where[12].bit_length()) if where[12] >> index & 1),
             )
         )
     objects, moved_j, friction_j, friction_energy_j = values[: len(SPACE)]

@@ -6,6 +6,7 @@ the ring); only the walls that the scene has are written, and only the objects t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from struct import Struct
 from typing import TYPE_CHECKING, cast
@@ -127,7 +128,7 @@ class RecordLayout:
         self._ports = PortLayout(axes)
         self.size = full.size + self._ports.size
         self.format = full.format + self._ports.format
-        self.pack = self.pack_walls
+        self.pack: Callable[..., int | None] = self.pack_walls
 
     def struct(self, walls: int) -> Struct:
         """How a record with this many walls is packed; it may be shorter than `size`."""
@@ -235,64 +236,28 @@ class RecordLayout:
         busy_us: float,
         skipped: int,
         law: int,
-    ) -> None:
-        """The same for a scene with objects."""
-        scene = cast("SpaceTick", tick)
-        motion = tick.motion
-        books = scene.totals()
-        totals = books.ledger
-        near = scene.awake
-        if len(near) > MOST_OBJECTS:
-            near = sorted(near, key=untouched)[:MOST_OBJECTS]
-        values: list[float] = []
-        for contact in tick.contacts:
-            values += contact_values(contact, contact.wall.stiffness_n_per_m, contact.ledger)
-        values += (scene.objects, books.moved_j, books.friction_j, books.friction_stored_j)
-        x, y, z = motion.position_m
-        shown = [each for each in near if not each.leaving]
-        for each in shown:
-            values += object_values(each, x, y, z)
-        walls = len(tick.contacts)
-        self._in_space[walls][len(shown)].pack_into(
-            area,
-            at,
-            seq,
-            deadline_ns,
-            late_us,
-            busy_us,
-            motion.dt_s,
-            skipped,
-            tick.flags if sample.calibrated else tick.flags | _UNCALIBRATED,
-            law,
-            sample.buttons,
-            sample.gripper_m,
-            totals.energy_j,
-            totals.stored_j,
-            totals.dissipated_j,
-            totals.generated_j,
-            walls + _WALLS * (len(shown) + 1),
-            *motion.position_m,
-            *motion.velocity_m_per_s,
-            *tick.force_n,
-            *tick.requested_n,
-            *(sample.orientation if self.orientation else ()),
-            *values,
-        )
+        work_j: float = 0.0,
+        more: int = 0,
+    ) -> int:
+        """The same for a scene with objects.
 
-    def pack_ports(
-        self,
-        area: memoryview,
-        at: int,
-        tick: ControlTick,
-        sample: Sample,
-        seq: int,
-        deadline_ns: int,
-        late_us: float,
-        busy_us: float,
-        skipped: int,
-        law: int,
-    ) -> None:
-        """The same for a scene with couplings, forces or remote objects, and with what else it has."""
+        Args:
+            area: as `pack_walls` has it, and so are those up to `law`.
+            at: see area.
+            tick: see area.
+            sample: see area.
+            seq: see area.
+            deadline_ns: see area.
+            late_us: see area.
+            busy_us: see area.
+            skipped: see area.
+            law: see area.
+            work_j: of the clients of couplings and forces, which is recorded with those [J].
+            more: added to the number of walls, for what follows behind.
+
+        Returns:
+            Its length [bytes].
+        """
         motion = tick.motion
         books = tick.totals()
         totals = books.ledger
@@ -300,7 +265,6 @@ class RecordLayout:
         for contact in tick.contacts:
             values += contact_values(contact, contact.wall.stiffness_n_per_m, contact.ledger)
         walls = count = len(tick.contacts)
-        work_j = tick.port_work_j()
         struct = self._structs[walls]
         if tick.has_objects:
             scene = cast("SpaceTick", tick)
@@ -329,7 +293,7 @@ class RecordLayout:
             totals.stored_j,
             totals.dissipated_j,
             totals.generated_j,
-            count + _PORTS,
+            count + more,
             *motion.position_m,
             *motion.velocity_m_per_s,
             *tick.force_n,
@@ -337,7 +301,25 @@ class RecordLayout:
             *(sample.orientation if self.orientation else ()),
             *values,
         )
-        self._ports.pack(area, at + struct.size, tick, work_j)
+        return struct.size
+
+    def pack_ports(
+        self,
+        area: memoryview,
+        at: int,
+        tick: ControlTick,
+        sample: Sample,
+        seq: int,
+        deadline_ns: int,
+        late_us: float,
+        busy_us: float,
+        skipped: int,
+        law: int,
+    ) -> None:
+        """The same for a scene with couplings, forces or remote objects, and with what else it has."""
+        work_j = tick.port_work_j()
+        size = self.pack_space(area, at, tick, sample, seq, deadline_ns, late_us, busy_us, skipped, law, work_j, _PORTS)
+        self._ports.pack(area, at + size, tick, work_j)
 
     def unpack(self, row: bytes | memoryview) -> TickRecord:
         """Decode one record."""

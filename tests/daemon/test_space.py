@@ -57,4 +57,5 @@ def test_what_is_touched_is_told() -> None:
     assert sum(value * value for value in touch["proxy_m"]) ** 0.5 == pytest.approx(0.03, abs=1e-9)
     assert sum(value * value for value in touch["normal"]) == pytest.approx(1.0)
     assert touch["depth_m"] > 0.0
+    assert (touch["carrier"], touch["inside"]) == (0, [0])
     assert len(damping["damping_n_s_per_m"]) == 1

@@ -25,6 +25,7 @@ def spans_m(stiffness: float, law: str | None, kinds: Sequence[str], starts: int
     """How far the device moves in the last half second of each press, as the daemon's telemetry has it."""
     presses = starts * len(kinds)
     seen: list[list[list[float]]] = [[] for _ in range(presses)]
+    pushed = [False] * presses
     with (
         Daemon(scene_text(stiffness, law, kinds, starts), pythonpath=TOP) as daemon,
         Subscriber(daemon.endpoint, "hapticd/position") as subscriber,
@@ -35,6 +36,8 @@ def spans_m(stiffness: float, law: str | None, kinds: Sequence[str], starts: int
                 break
             if PRESS - JUDGED <= tick < PRESS:
                 seen[press].append(fields["position_m"])
+                pushed[press] = pushed[press] or any(fields["force_n"])
+    assert all(pushed), "the daemon has let the force out"  # as it does where its supervisor stalls for 10 s
     assert all(len(one) > 0.9 * JUDGED for one in seen)  # a busy machine may lose some
     return [math.hypot(*(max(axis) - min(axis) for axis in zip(*one, strict=True))) for one in seen]
 

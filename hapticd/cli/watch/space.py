@@ -68,7 +68,8 @@ def contact_lines(trail: Trail, status: Status, dampings: Sequence[float]) -> li
         return [Text(" free of ", style=_QUIET).append(names, "default")]
     lines = []
     for touch in trail.touches[:MOST_LINES]:
-        name = status.object_name[touch.object] if touch.object < len(status.object_name) else str(touch.object)
+        at = touch.object if touch.carrier < 0 else touch.carrier
+        name = status.object_name[at] if at < len(status.object_name) else str(at)
         newton = math.sqrt(sum(value * value for value in touch.force_n))
         line = Text(" ● ", style="bold cyan").append(f"{name:<12}", "bold")
         line.append(f" {1e3 * touch.depth_m:7.3f} mm deep", "default").append("  pushes ", _QUIET)

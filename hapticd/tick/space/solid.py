@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from functools import lru_cache
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from hapticd.config.objects import (
 from hapticd.errors import ConfigError
 from hapticd.shapes.field import Field
 from hapticd.shapes.pose import Pose
-from hapticd.shapes.solid import Placed, Proxy, group
+from hapticd.shapes.solid import Placed, Proxy, group, part_distance
 
 FASTEST_M_PER_S = 5.0
 """A device that is faster may be inside a thin object before it is looked for [m/s]."""
@@ -35,12 +36,13 @@ class Solid:
 
     Args:
         configs: its objects, the first of which gives it its name.
-        index: of the first object in the scene.
+        members: indices of its objects in the scene.
         period_s: time between ticks [s].
 
     Attributes:
         name: who it is through a reload.
-        index: of its first object in the scene.
+        members: indices of its objects in the scene.
+        index: of the first of them.
         configs: what the tables say.
         placed: the shapes at their places.
         proxy: the point on its surface that pulls the device back; it keeps its own state.
@@ -56,6 +58,7 @@ class Solid:
         "configs",
         "damping_n_s_per_m",
         "index",
+        "members",
         "name",
         "placed",
         "proxy",
@@ -64,10 +67,11 @@ class Solid:
         "stiffness_n_per_m",
     )
 
-    def __init__(self, configs: Sequence[ObjectConfig], index: int, period_s: float) -> None:
+    def __init__(self, configs: Sequence[ObjectConfig], members: Sequence[int], period_s: float) -> None:
         first = configs[0]
         self.name = first.name
-        self.index = index
+        self.members = tuple(members)
+        self.index = members[0]
         self.configs = tuple(configs)
         self.placed = [placed(config) for config in configs]
         self.remote = first.remote
@@ -91,6 +95,29 @@ class Solid:
         if spring_n <= limit_n:
             return 0.5 * spring_n * stretch_m
         return limit_n * (stretch_m - 0.5 * limit_n / self.stiffness_n_per_m)
+
+    def shares(self, x: float, y: float, z: float) -> tuple[int, int]:
+        """Which of its objects carries the force, and a bit each for those that the device is in.
+
+        Args:
+            x: the device in the world, with y and z [m].
+            y: see x.
+            z: see x.
+        """
+        proxy = self.proxy
+        pose = proxy.pose
+        held = (proxy.sx, proxy.sy, proxy.sz) if proxy.rough else (proxy.gx, proxy.gy, proxy.gz)
+        device = pose.own((x, y, z))
+        least_m = inf
+        carrier, inside = self.index, 0
+        for at, index in enumerate(self.members):
+            away_m = part_distance(proxy, at - 1, *held)
+            if away_m < least_m:
+                least_m = away_m
+                carrier = index
+            if part_distance(proxy, at - 1, *device) < 0.0:
+                inside |= 1 << index
+        return carrier, inside
 
     def same_as(self, other: Solid) -> bool:
         """Whether the tables of the two say the same."""
@@ -177,7 +204,7 @@ def compile_objects(objects: Sequence[ObjectConfig], period_s: float) -> list[So
         (*(getattr(config, key) for key in _SURFACE), config.name if config.remote else "") for config in objects
     ]
     return [
-        Solid([objects[at] for at in members], members[0], period_s)
+        Solid([objects[at] for at in members], members, period_s)
         for members in sorted(group(shapes, surfaces), key=lambda members: members[0])
     ]
 

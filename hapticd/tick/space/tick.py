@@ -118,7 +118,7 @@ class SpaceTick(ControlTick):
                 elif not solid.same_as(contact.solid):
                     changed.append((contact, solid, contact.rougher(solid, make)))
                 else:
-                    contact.solid.index = solid.index
+                    contact.solid.index, contact.solid.members = solid.index, solid.members
                 there.append(contact)
                 yield
             fading = [(contact, _still(contact.channels)) for contact in known.values()]

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 import random
+from functools import cache
+from itertools import product
 
 import pytest
 from hypothesis import given
@@ -58,6 +60,22 @@ SHARP = {
 seeds = st.integers(0, 2**32)
 speeds = st.sampled_from([0.05, 0.3, 1.5])
 laws = st.sampled_from(LAWS)
+
+
+@cache
+def free(scene: str) -> Point:
+    """A point near the origin out of everything: a device that starts inside comes in by a ramp."""
+    off = (0.0, 0.005, -0.005, 0.03)
+    for at in product(off, off, off):
+        if not any(solid.depth_m for solid in Rig(scene).start(at).tick.solids):
+            return at
+    raise AssertionError("no room is left")
+
+
+def about(scene: str, seed: int, speed: float) -> list[Point]:
+    """A way about a free point."""
+    x, y, z = free(scene)
+    return [(x, y, z), *((x + dx, y + dy, z + dz) for dx, dy, dz in way(seed, 150, speed, 0.02))]
 
 
 def way(seed: int, ticks: int, speed: float, reach_m: float) -> list[Point]:
@@ -129,7 +147,7 @@ def test_in_a_convex_room_no_force_jumps(name: str) -> None:
     @given(seed=seeds, speed=speeds, law=laws)
     def hold(seed: int, speed: float, law: str) -> None:
         rig = Rig(ROOMS[name], law)
-        assert worst_jump(rig, way(seed, 150, speed, 0.02)) <= 0.0
+        assert worst_jump(rig, about(ROOMS[name], seed, speed)) <= 0.0
         touched.append(any(map(any, rig.forces)))
 
     hold()
@@ -144,7 +162,7 @@ def test_a_surface_with_friction_adds_its_cone_and_no_more(name: str) -> None:
     @examples(4)
     @given(seed=seeds, speed=speeds, law=laws)
     def hold(seed: int, speed: float, law: str) -> None:
-        assert worst_jump(Rig(scene, law), way(seed, 150, speed, 0.02), more=0.5) <= 0.0
+        assert worst_jump(Rig(scene, law), about(scene, seed, speed), more=0.5) <= 0.0
 
     hold()
 
@@ -178,7 +196,7 @@ def test_no_force_grows_or_turns_round_by_more_than_the_device_moved(name: str) 
             keys = f"static_friction = {friction[0]}\ndynamic_friction = {friction[1]}\nshape ="
             text = text.replace("shape =", keys)
         rig = Rig(text, law)
-        points = way(seed, 150, speed, 0.02)
+        points = about(text, seed, speed)
         rig.start(points[0])
         before, force, drag_n = points[0], rig.force, 0.0
         for at in points[1:]:

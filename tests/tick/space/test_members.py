@@ -1,0 +1,69 @@
+"""Objects that overlap and are alike are one solid: a record tells which carries the force, and which are met."""
+
+from __future__ import annotations
+
+from hapticd.config.walls import MAX_WALLS
+from hapticd.tick.contact_record import ObjectRecord
+from hapticd.tick.record import RecordLayout
+from tests.tick.space.rig import Point, Rig, ball, table
+
+SCENE = (
+    ball("far", 4000.0, position_m=(0.2, 0.0, 0.0))
+    + table("table", "plane")
+    + ball("ball", radius_m=0.012)
+    + table("post", "cylinder", radius_m=0.005, length_m=0.04, position_m=(0.05, 0.0, 0.01), orientation=(1, 0, 0, 0))
+)
+FAR, TABLE, BALL, POST = range(4)
+
+
+def recorded(rig: Rig) -> ObjectRecord:
+    """The one object that is touched, as a reader of the ring finds it."""
+    layout = RecordLayout(3, False, MAX_WALLS)
+    layout.serve(rig.tick)
+    area = memoryview(bytearray(layout.size))
+    layout.pack(area, 0, rig.tick, rig.sample, 7, 0, 0.0, 0.0, 0, 0)
+    space = layout.unpack(area).space
+    assert space is not None
+    (touched,) = [one for one in space.near if one.contact.in_contact]
+    return touched
+
+
+def pressed(*points: Point) -> ObjectRecord:
+    rig = Rig(SCENE).start(points[0])
+    for at in points[1:]:
+        rig.to(at, 40)
+    return recorded(rig)
+
+
+def test_on_the_ball_the_ball_carries() -> None:
+    one = pressed((0.0, 0.0, 0.014), (0.0, 0.0, 0.0115))
+    assert (one.index, one.carrier, one.inside) == (TABLE, BALL, (BALL,))
+
+
+def test_beside_it_the_table_does() -> None:
+    one = pressed((0.03, 0.0, 0.002), (0.03, 0.0, -0.0005))
+    assert (one.index, one.carrier, one.inside) == (TABLE, TABLE, (TABLE,))
+
+
+def test_a_device_may_be_in_two_of_them_while_one_carries() -> None:
+    one = pressed((0.0, 0.0, 0.014), (0.0, 0.0, -0.001))
+    assert (one.carrier, one.inside) == (BALL, (TABLE, BALL))
+
+
+def test_a_shape_with_a_place_of_its_own_is_seen_where_it_is() -> None:
+    one = pressed((0.05, 0.0, 0.032), (0.05, 0.0, 0.0295))
+    assert (one.carrier, one.inside) == (POST, (POST,))
+
+
+def test_an_object_by_itself_carries_its_own_force() -> None:
+    one = pressed((0.2, 0.0, 0.031), (0.2, 0.0, 0.0299))
+    assert (one.index, one.carrier, one.inside) == (FAR, FAR, (FAR,))
+
+
+def test_a_scene_in_another_order_keeps_their_numbers() -> None:
+    rig = Rig(SCENE).start((0.0, 0.0, 0.014)).to((0.0, 0.0, 0.0115), 40)
+    rig.switch(SCENE + ball("new", 3000.0, position_m=(-0.2, 0.0, 0.0))).to((0.0, 0.0, 0.0114), 5)
+    assert recorded(rig).carrier == BALL
+    rig.switch(ball("new", 3000.0, position_m=(-0.2, 0.0, 0.0)) + SCENE).to((0.0, 0.0, 0.0115), 5)
+    one = recorded(rig)
+    assert (one.index, one.carrier, one.inside) == (TABLE + 1, BALL + 1, (BALL + 1,))
