@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from random import Random
 from typing import Any
 
 import tomlkit
@@ -18,6 +17,7 @@ from hapticd.offline.presses import aimed
 from hapticd.simulation.batch import Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.boundaries import damper_peak
+from hapticd_studies.draws import Draws, digits
 
 DURATION_S = 6.0
 MAX_FORCE_N = 12.0
@@ -146,14 +146,8 @@ class Device:
 @lru_cache(maxsize=65536)
 def draw(seed: int, index: int) -> Device:
     """The device of a seed and an index; numbers have 4 digits, so that they can be read and typed."""
-    source = Random(f"hapticd robustness {seed}:{index}")
-
-    def uniform(low: float, high: float) -> float:
-        return _digits(low + (high - low) * source.random())
-
-    def logarithmic(low: float, high: float) -> float:
-        return _digits(low * (high / low) ** source.random())
-
+    source = Draws(f"hapticd robustness {seed}:{index}")
+    uniform, logarithmic = source.even, source.logarithmic
     # Every number is drawn whether it is used or not: a change of one share then leaves all other numbers alone.
     rate_hz, stiffness = logarithmic(500.0, 4000.0), logarithmic(4e3, 3e4)
     options: dict[str, Any] = {
@@ -184,9 +178,5 @@ def draw(seed: int, index: int) -> Device:
     wall = WallConfig(stiffness_n_per_m=stiffness)
     if stiffens:
         change = WallChange(at_s=DURATION_S / 2.0, stiffness_n_per_m=stiffness)
-        wall = WallConfig(stiffness_n_per_m=_digits(softer * stiffness), changes=(change,))
+        wall = WallConfig(stiffness_n_per_m=digits(softer * stiffness), changes=(change,))
     return Device(seed, index, SimulationOptions.model_validate({**options, "hand": hand}), wall, rate_hz)
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.4g}")

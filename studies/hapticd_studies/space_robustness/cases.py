@@ -16,8 +16,9 @@ from hapticd.config.models import LoopConfig
 from hapticd.errors import ConfigError
 from hapticd.simulation.space.linkage import mass_matrix
 from hapticd_studies.boundaries import damper_peak
+from hapticd_studies.draws import Draws, digits
 from hapticd_studies.law_spec import LawSpec
-from hapticd_studies.space_robustness.surfaces import KINDS, Surface, digits, surface
+from hapticd_studies.space_robustness.surfaces import KINDS, Surface, surface
 
 DURATION_S = 3.0
 MAX_FORCE_N = 12.0
@@ -126,14 +127,8 @@ class Case:
 @lru_cache(maxsize=4096)
 def draw(seed: int, index: int) -> Case:
     """The case of a seed and an index."""
-    source = Random(f"hapticd space robustness {seed}:{index}")
-
-    def uniform(low: float, high: float) -> float:
-        return digits(source.uniform(low, high))
-
-    def logarithmic(low: float, high: float) -> float:
-        return digits(low * (high / low) ** source.random())
-
+    source = Draws(f"hapticd space robustness {seed}:{index}")
+    uniform, logarithmic = source.even, source.logarithmic
     # Kinds go round, so that a few cases show them all; every number is drawn whether it is used or not.
     kind, hand = KINDS[index % len(KINDS)], HANDS[index // len(KINDS) % len(HANDS)]
     touched = surface(source, kind, hand != "circle")

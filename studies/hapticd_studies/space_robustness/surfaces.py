@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from random import Random
 from typing import Any
 
 from hapticd.shapes.pose import Pose, Vector
+from hapticd_studies.draws import Draws, digits
 
 KINDS = (
     "plane",
@@ -59,7 +59,7 @@ class _Own:
     places: list[Vector] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
 
 
-def surface(source: Random, kind: str, turned: bool) -> Surface:
+def surface(source: Draws, kind: str, turned: bool) -> Surface:
     """A random surface of a kind, at a random place.
 
     Args:
@@ -70,7 +70,7 @@ def surface(source: Random, kind: str, turned: bool) -> Surface:
     own = _own(source, kind)
     facing = [source.gauss(0.0, 1.0) for _ in range(4)]
     turn = [digits(value) for value in facing] if turned else [1.0, 0.0, 0.0, 0.0]
-    origin = [digits(source.uniform(-0.02, 0.02)) for _ in range(3)]
+    origin = [source.even(-0.02, 0.02) for _ in range(3)]
     pose = Pose.of(origin, turn)
     objects = tuple(
         {
@@ -84,15 +84,10 @@ def surface(source: Random, kind: str, turned: bool) -> Surface:
     return Surface(kind, objects, pose.point(own.at_m), pose.out(own.normal), pose.out(own.along), own.bend_per_m)
 
 
-def digits(value: float) -> float:
-    """Four digits, which can be read and typed."""
-    return float(f"{value:.4g}")
-
-
-def _own(source: Random, kind: str) -> _Own:
-    r = digits(source.uniform(0.01, 0.05))
-    off = digits(source.uniform(0.002, 0.01))
-    rounding = digits(source.uniform(0.002, 0.006))
+def _own(source: Draws, kind: str) -> _Own:
+    r = source.even(0.01, 0.05)
+    off = source.even(0.002, 0.01)
+    rounding = source.even(0.002, 0.006)
     side = 0.08
     half = 0.5 * side
     box: dict[str, Any] = {"shape": "box", "size_m": [side] * 3}

@@ -18,6 +18,7 @@ from hapticd.config.walls import WallConfig
 from hapticd.law import LawParams
 from hapticd.simulation.options import Change, Hand, RecordedForce, SimulationOptions
 from hapticd_studies.boundaries import Loop, damper_peak, stable_limit
+from hapticd_studies.draws import Draws, digits
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.transparency.hands import KINDS, Movement, movement, options_of
 
@@ -187,26 +188,26 @@ class Held:
 @lru_cache(maxsize=65536)
 def draw(seed: int, index: int) -> Held:
     """The device of a seed and an index; numbers have 4 digits, so that they can be read and typed."""
-    source = Random(f"hapticd transparency {seed}:{index}")
-    rate_hz = _logarithmic(source, 500.0, 4000.0)
+    source = Draws(f"hapticd transparency {seed}:{index}")
+    rate_hz = source.logarithmic(500.0, 4000.0)
     period_s = LoopConfig(rate_hz=rate_hz).period_s
-    mass_kg = _logarithmic(source, 0.02, 5.0)
-    viscous = _digits(mass_kg * source.uniform(4.0, 24.0))
+    mass_kg = source.logarithmic(0.02, 5.0)
+    viscous = digits(mass_kg * source.uniform(4.0, 24.0))
     delay = source.randrange(3)
     options: dict[str, Any] = {
         "mass_kg": mass_kg,
         "viscous_n_s_per_m": viscous,
-        "resolution_m": _logarithmic(source, 1e-6, 3e-5),
+        "resolution_m": source.logarithmic(1e-6, 3e-5),
         "max_force_n": MAX_FORCE_N,
         "force_delay_samples": delay,
         "hand": {
-            "mass_kg": _digits(source.uniform(0.0, 0.1)),
-            "damping_n_s_per_m": _digits(source.uniform(0.3, 1.5)),
-            "stiffness_n_per_m": _digits(source.uniform(40.0, 200.0)),
+            "mass_kg": source.even(0.0, 0.1),
+            "damping_n_s_per_m": source.even(0.3, 1.5),
+            "stiffness_n_per_m": source.even(40.0, 200.0),
         },
     }
     # Every number is drawn whether it is used or not: a change of one share then leaves all other numbers alone.
-    lag, noise_m = _digits(rate_hz * source.uniform(0.15, 0.6)), _digits(source.uniform(2e-7, 4e-6))
+    lag, noise_m = digits(rate_hz * source.uniform(0.15, 0.6)), source.even(2e-7, 4e-6)
     lags, noisy = (source.random() < chance for chance in (1.0 / 3.0, 0.5))
     if lags:
         options["bandwidth_hz"] = lag
@@ -214,8 +215,8 @@ def draw(seed: int, index: int) -> Held:
         options |= {"noise_m": noise_m, "seed": index + 1}
     moving_kg, damping = mass_kg + options["hand"]["mass_kg"], viscous + options["hand"]["damping_n_s_per_m"]
     own = stable_limit(Loop(moving_kg, damping, period_s, delay_samples=delay))
-    wanted = min(HARDEST * damper_peak(moving_kg, period_s, delay), own * _logarithmic(source, 0.2, 5.0))
-    wall = WallConfig(stiffness_n_per_m=_digits(wanted))
+    wanted = min(HARDEST * damper_peak(moving_kg, period_s, delay), own * source.logarithmic(0.2, 5.0))
+    wall = WallConfig(stiffness_n_per_m=digits(wanted))
     kind = KINDS[index % len(KINDS)]
     return Held(seed, index, kind, SimulationOptions.model_validate(options), wall, rate_hz, own)
 
@@ -224,16 +225,16 @@ def draw(seed: int, index: int) -> Held:
 def draw_out_of_sample(seed: int, index: int) -> Held:
     """The device of `draw` with what no law was made for, from a generator of its own; its wall is drawn anew."""
     before = draw(seed, index)
-    source = Random(f"hapticd transparency out of sample {seed}:{index}")
+    source = Draws(f"hapticd transparency out of sample {seed}:{index}")
     part = PARTS[index % len(PARTS)]
     late, share = source.uniform(0.0, 2.0), source.uniform(0.1, 0.5)
-    hertz, ratio = _logarithmic(source, 60.0, 500.0), _logarithmic(source, 0.005, 0.05)
+    hertz, ratio = source.logarithmic(60.0, 500.0), source.logarithmic(0.005, 0.05)
     sensor = "handle" if source.random() < 0.25 else "motor"
     more: dict[str, Any] = {"bandwidth_hz": 0.0}
     if part != "flexible":
-        more |= {"force_delay_samples": 0, "force_delay_s": _digits(late * before.period_s)}
+        more |= {"force_delay_samples": 0, "force_delay_s": digits(late * before.period_s)}
     if part != "fraction":
-        flexible = {"frequency_hz": hertz, "handle_share": _digits(share), "damping_ratio": ratio, "sensor": sensor}
+        flexible = {"frequency_hz": hertz, "handle_share": digits(share), "damping_ratio": ratio, "sensor": sensor}
         more["flexible"] = flexible
     options = SimulationOptions.model_validate({**before.options.model_dump(exclude_unset=True), **more})
     hand = options.hand
@@ -251,13 +252,5 @@ def draw_out_of_sample(seed: int, index: int) -> Held:
     )
     delay = options.force_delay_samples + math.ceil(options.force_delay_s / before.period_s)
     most = HARDEST * damper_peak(before.mass_kg, before.period_s, delay)
-    wall = WallConfig(stiffness_n_per_m=_digits(min(most, own * _logarithmic(source, 0.2, 5.0))))
+    wall = WallConfig(stiffness_n_per_m=digits(min(most, own * source.logarithmic(0.2, 5.0))))
     return Held(seed, index, before.kind, options, wall, before.rate_hz, own, part)
-
-
-def _logarithmic(source: Random, low: float, high: float) -> float:
-    return _digits(low * (high / low) ** source.random())
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.4g}")

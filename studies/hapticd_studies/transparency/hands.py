@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Any
 
+from hapticd_studies.draws import digits
+
 KINDS = ("press", "tap", "stroke", "tremor", "hold", "regrip", "let-go")
 
 IN, HOLD, OUT = 0, 1, 2
@@ -115,7 +117,7 @@ def _regrip(found: Movement, source: Random, grip: dict[str, float], duration_s:
     while found.now_s < duration_s:
         found.wait(source.uniform(1.0, 3.0))
         firmer = 0.3 * 10.0 ** source.random()
-        found.grips.append({"at_s": found.now_s, **{name: _digits(firmer * value) for name, value in grip.items()}})
+        found.grips.append({"at_s": found.now_s, **{name: digits(firmer * value) for name, value in grip.items()}})
 
 
 def _let_go(found: Movement, source: Random, grip: dict[str, float]) -> None:
@@ -163,7 +165,3 @@ def options_of(found: Movement) -> dict[str, Any]:
 def _round(value: float) -> float:
     """To a micro-unit: as a file shows it."""
     return round(value, 6)
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.4g}")
