@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -88,7 +88,7 @@ class Rehearsal:
             self._driver.close()
             raise
 
-    def run(self, ticks: int) -> Iterator[int]:
+    def run(self, ticks: int) -> Generator[int, None, None]:
         """Run, and stop after each tick; its number is given. Ends early when the model has diverged."""
         driver, tick = self._driver, self.tick
         guard = tick.guard
@@ -113,6 +113,10 @@ class Rehearsal:
             self.diverged = not all(abs(x_m) < FARTHEST_M for x_m in at_m)
         finally:
             driver.close()
+
+    def hold(self) -> None:
+        """Have the device hold the force of a tick that was made elsewhere: `run` goes on from there."""
+        self._driver.write(self.tick.force_n)
 
 
 def simulation_options(loaded: LoadedConfig) -> SimulationOptions:

@@ -24,6 +24,8 @@ class SimulatedDevice:
     Attributes:
         ticks: periods done.
         state: its position, velocity, actuator and sensor.
+        params: its coefficients now.
+        buffers: its delay line, and a recorded hand.
 
     Raises:
         ValueError: the model cannot be stepped at this rate.
@@ -46,28 +48,33 @@ class SimulatedDevice:
                 setattr(params, name, value)
             self._coming.append((tick, params))
         self._coming.reverse()
-        self._buffers = Buffers(delay_line(options, period_s), *recorded_points(options))
-        self._params = self._coming.pop()[1]
+        self.buffers = Buffers(delay_line(options, period_s), *recorded_points(options))
+        self.params = self._coming.pop()[1]
         self._next_change = self._coming[-1][0] if self._coming else math.inf
-        self._sense(self.state, self._params)
+        self._sense(self.state, self.params)
 
     def advance(self, force_n: float) -> None:
         """One period with this command held, then a new sample of the position."""
         if self.ticks >= self._next_change:
-            self._params = self._coming.pop()[1]
+            self.params = self._coming.pop()[1]
             self._next_change = self._coming[-1][0] if self._coming else math.inf
-        self._move(self.state, self._params, self._buffers, force_n)
-        self._sense(self.state, self._params)
+        self._move(self.state, self.params, self.buffers, force_n)
+        self._sense(self.state, self.params)
         self.ticks += 1
 
     def push(self, force_n: float) -> None:
         """Take the command of a period in; the mechanics go on with those of the other axes."""
-        self._move(self.state, self._params, self._buffers, force_n)
+        self._move(self.state, self.params, self.buffers, force_n)
 
     def sense(self) -> None:
         """Take the sample at the end of that period."""
-        self._sense(self.state, self._params)
+        self._sense(self.state, self.params)
         self.ticks += 1
+
+    @property
+    def changing(self) -> bool:
+        """Whether the device is another at a later time."""
+        return bool(self._coming)
 
     @property
     def x_m(self) -> float:

@@ -12,13 +12,14 @@ from numba import njit
 from hapticd.shapes.proxy import follow
 from hapticd.shapes.scalars import PART_KINDS, PROXY_KINDS
 from hapticd.shapes.solid import Proxy
-from hapticd.simulation.compiler.compile import OPTIONS, compiled, record_dtype
+from hapticd.simulation.compiler.classes import Machine
+from hapticd.simulation.compiler.compile import OPTIONS, record_dtype
 from tests.shapes.walks import SOLIDS, walk
 
 
 @cache
 def machine() -> Any:
-    inner = compiled(follow)
+    inner = Machine({}, {}).compiled(follow)
 
     @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def step(proxies: Any, others: Any, voxels: Any, x: Any, y: Any, z: Any) -> None:

@@ -47,7 +47,7 @@ def growth(keys: dict[str, Any], period: float, feedback: Callable[[float, float
         x, v, last_x = (float(value) for value in state[:3])
         mover = device(period, initial_position_m=x, initial_velocity_m_per_s=v, **keys)
         for waiting in state[3:]:
-            mover._buffers.line[mover.state.line_at] = float(waiting)
+            mover.buffers.line[mover.state.line_at] = float(waiting)
             mover.state.line_at = (mover.state.line_at + 1) % (delay + 1)
         force = feedback(x, (x - last_x) / period)
         mover.advance(force)

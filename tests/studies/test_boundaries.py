@@ -230,7 +230,7 @@ def test_a_flexible_loop_turns_unstable_where_the_model_itself_does(late: float,
         state = mover.state
         state.x_m, state.v_m_per_s, state.stretch_m, state.stretch_m_per_s = unit[:4]
         for at in range(whole):
-            mover._buffers.line[-1 - at] = unit[4 + at]
+            mover.buffers.line[-1 - at] = unit[4 + at]
         state.before_n = unit[4 + whole]
         force = -stiffness * unit[0]
         mover.advance(force)

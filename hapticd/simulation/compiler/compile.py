@@ -81,11 +81,7 @@ def compiled_step(law: ModuleType) -> Any:
     Raises:
         PluginError: it cannot be compiled; the message names the law, the line and the construct.
     """
-    fatal = [finding for finding in lint_law(law) if finding.fatal]
-    if fatal:
-        raise PluginError(
-            "\n".join([f"law {law.__name__} cannot be compiled:", *(f"  {finding}" for finding in fatal)])
-        )
+    refuse(law)
     machine = compiled(law.step)
     arguments = (
         from_dtype(record_dtype(state_fields(law))),
@@ -97,6 +93,19 @@ def compiled_step(law: ModuleType) -> Any:
     except NumbaError as error:
         raise PluginError(f"law {law.__name__} cannot be compiled:\n  {_in_plain_words(error)}") from error
     return machine
+
+
+def refuse(law: ModuleType) -> None:
+    """Say of a law what in it cannot be compiled, if anything.
+
+    Raises:
+        PluginError: it cannot be compiled; the message names the law, the line and the construct.
+    """
+    fatal = [finding for finding in lint_law(law) if finding.fatal]
+    if fatal:
+        raise PluginError(
+            "\n".join([f"law {law.__name__} cannot be compiled:", *(f"  {finding}" for finding in fatal)])
+        )
 
 
 def _on_stack(_typing: Any, record: Any) -> Any:

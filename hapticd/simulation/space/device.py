@@ -23,6 +23,7 @@ class SpatialDevice:
 
     Attributes:
         axes: the model along each axis.
+        masses: of axes that share a mass matrix; None where each goes by itself.
         ticks: periods done.
         measured_m: position as the sensors show it, always the same list [m].
 
@@ -35,20 +36,20 @@ class SpatialDevice:
         self.period_s = period_s
         self.ticks = 0
         along = axis_options(options)
-        self._masses = masses(options, period_s)
-        self.axes = [SimulatedDevice(one, period_s, self._masses is not None) for one in along]
+        self.masses = masses(options, period_s)
+        self.axes = [SimulatedDevice(one, period_s, self.masses is not None) for one in along]
         self.measured_m = [one.measured_m for one in self.axes]
 
     def advance(self, force_n: Sequence[float]) -> None:
         """One period with these commands held, then a new sample of each position."""
         measured_m = self.measured_m
         axes = self.axes
-        if self._masses is None:
+        if self.masses is None:
             for axis, device in enumerate(axes):
                 device.advance(force_n[axis])
                 measured_m[axis] = device.measured_m
         else:
-            matrices = self._masses
+            matrices = self.masses
             first, second, third = (device.state for device in axes)
             for axis, device in enumerate(axes):
                 device.push(force_n[axis])

@@ -83,7 +83,7 @@ class SingleDevice(SimulatedDevice):
 
     def __init__(self, options: SimulationOptions, period_s: float) -> None:
         super().__init__(options, period_s)
-        for params in [self._params, *(coming for _, coming in self._coming)]:
+        for params in [self.params, *(coming for _, coming in self._coming)]:
             _to_single(params)
         _to_single(self.state)
         self._sensor = PlantParams()
