@@ -28,7 +28,7 @@ SHIPPED = sorted(
     path.stem
     for path in directory("config").glob("*.toml")
     if tomllib.loads(path.read_text()).get("device", {}).get("driver", "loopback") == "loopback"
-    and "axes = 3" not in path.read_text()  # the study of what a scene needs is of one axis
+    and "linkage" not in path.read_text()  # an axis of one goes only with the linkage
 )
 
 FRICTION = """

@@ -15,6 +15,9 @@ from hapticd_studies.scene.answers import Answers
 from hapticd_studies.scene.study import Scene
 from hapticd_studies.scene.ticks import TickCount
 
+_ON_ONE_AXIS = ("settles", "force", "energy", "stiffness")
+_IN_SPACE = ("force", "energy", "path", "felt")
+
 _MOST = 10.0
 """Changes beyond this share are all the same to a reader."""
 
@@ -23,22 +26,26 @@ def table(scene: Scene) -> Table:
     """Each term by itself, then all that can go together."""
     shown = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     shown.add_column("without", no_wrap=True)
-    for head in ("saves", "settles", "force", "energy", "stiffness"):
+    in_space = scene.full.in_space
+    for head in ("saves", *(_IN_SPACE if in_space else _ON_ONE_AXIS)):
         shown.add_column(head, justify="right", no_wrap=True)
     shown.add_column("needed", overflow="fold")
     full = scene.full
     shown.add_row(
         "nothing",
         f"of {scene.operations:.0f}",
-        _seconds(full.settled_s),
+        *([] if in_space else [_seconds(full.settled_s)]),
         f"{full.peak_force_n:.3g} N",
         f"{max(map(abs, full.energy_j)):.2g} J",
-        _number(full.displayed_stiffness_n_per_m),
+        *(["", ""] if in_space else [_number(full.displayed_stiffness_n_per_m)]),
         full.outcome.words,
     )
     for one in scene.removals:
         if one.answers is None:
-            shown.add_row(one.term.name, "", "", "", "", "", "yes: there is no such configuration")
+            reason = "yes: there is no such configuration"
+            if one.term in scene.left_out:
+                reason = "once others are gone: not before is there such a configuration"
+            shown.add_row(one.term.name, "", "", "", "", "", reason)
             continue
         now = {"verdict": f"verdict ({one.answers.verdict})"}
         needed = "no"
@@ -47,10 +54,12 @@ def table(scene: Scene) -> Table:
             needed = f"{alone}: {', '.join(now.get(name, name) for name in one.broken)}"
         elif one.term not in scene.left_out:
             needed = "once others are gone"
-        shown.add_row(one.term.name, f"{one.saved:.0f}", *_cells(one.answers), needed)
+        shown.add_row(one.term.name, f"{one.saved:.0f}", *_cells(one.answers, in_space), needed)
     saved = scene.operations - scene.minimal_operations
     name = f"all {len(scene.left_out)} that can go"
-    shown.add_row(name, f"{saved:.0f}", *_cells(scene.minimal_answers), scene.minimal_answers.verdict, style="bold")
+    shown.add_row(
+        name, f"{saved:.0f}", *_cells(scene.minimal_answers, in_space), scene.minimal_answers.verdict, style="bold"
+    )
     return shown
 
 
@@ -122,7 +131,9 @@ def json(scene: Scene, ticks: Sequence[TickCount], duration_s: float) -> bytes:
     )
 
 
-def _cells(found: Answers) -> list[str]:
+def _cells(found: Answers, in_space: bool) -> list[str]:
+    if in_space:
+        return [_percent(found.force), _percent(found.energy), _percent(found.path), f"{found.felt:.2g}"]
     return [
         _seconds(found.settled_s),
         _percent(found.force),

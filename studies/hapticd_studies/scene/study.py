@@ -11,7 +11,8 @@ from hapticd.errors import HapticdError
 from hapticd.offline.rehearsal import rehearse
 from hapticd.offline.run import Run
 from hapticd_studies.scene.answers import Answers, answers
-from hapticd_studies.scene.terms import Term, reduced, terms_of
+from hapticd_studies.scene.edits import Term
+from hapticd_studies.scene.terms import reduced, terms_of
 from hapticd_studies.scene.ticks import SETTLE_TICKS, tick_operations
 
 _COUNTED = 20
