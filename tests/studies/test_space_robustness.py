@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,3 +108,23 @@ def test_what_makes_no_sense_is_one_line(
 ) -> None:
     assert study(*arguments, "--laws", "none") == 2
     assert capsys.readouterr().err.startswith(f"hapticd: {line}")
+
+
+def test_a_crease_shakes_as_long_as_its_sampled_spring_leaks_more_than_what_damps_across() -> None:
+    """No law acts across a crease: what decides there is the device's own damping against K T / 2."""
+    case = draw(1, 955)
+    assert case.surface.kind == "notch of a union"
+    leak = 0.5 * case.stiffness_n_per_m * case.period_s
+    spans_m = []
+    for share in (0.8, 1.3):
+        hand = case.options["space"]["hand"]
+        space = {**case.options["space"], "viscous_n_s_per_m": [share * leak - hand["damping_n_s_per_m"][0]] * 3}
+        damped = replace(case, options={**case.options, "space": space})
+        spans_m.append(judged(damped, RING, Criterion())[COLUMNS.index("span_m")])
+    assert spans_m[0] > 2e-4
+    assert spans_m[1] < 5e-5
+
+
+def test_no_case_starts_where_its_sensor_shows_it_inside() -> None:
+    """The start of 1:667 is 10 um off a pipe, less than a step of its sensor."""
+    assert judged(draw(1, 667), NONE, Criterion())[0] != Verdict.STOPPED

@@ -13,8 +13,12 @@ import tomlkit
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import LoopConfig
+from hapticd.config.objects import OBJECT
 from hapticd.errors import ConfigError
+from hapticd.shapes.distance import shape_distance
+from hapticd.shapes.solid import Part
 from hapticd.simulation.space.linkage import mass_matrix
+from hapticd.tick.space.solid import placed
 from hapticd_studies.boundaries import damper_peak
 from hapticd_studies.draws import Draws, digits
 from hapticd_studies.law_spec import LawSpec
@@ -174,10 +178,13 @@ def draw(seed: int, index: int) -> Case:
         case _:
             force = {"profile": "let-go", "newton": press, "at_s": LETS_GO_S}
 
+    resolution_m = logarithmic(1e-6, 3e-5)
+    while _shown_inside(objects, at + start_m * normal, resolution_m):  # by the sensor's steps: a step farther off
+        start_m += resolution_m
     space: dict[str, Any] = {"position_m": _list(at + start_m * normal)}
     options: dict[str, Any] = {
         "axes": 3,
-        "resolution_m": logarithmic(1e-6, 3e-5),
+        "resolution_m": resolution_m,
         "max_force_n": MAX_FORCE_N,
         "force_delay_samples": int(late),
         "space": space,
@@ -224,6 +231,16 @@ def _turn(source: Random) -> Any:
     """A random rotation."""
     matrix, _ = np.linalg.qr(np.array([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)]))
     return matrix
+
+
+def _shown_inside(objects: list[dict[str, Any]], at_m: Any, resolution_m: float) -> bool:
+    """Whether a sensor shows a place as one inside an object, where a run is refused to begin."""
+    shown_m = _list(np.round(at_m / resolution_m) * resolution_m)
+    for each in objects:
+        shape = placed(OBJECT.validate_python(each))
+        if shape_distance(Part(shape, shape.pose), (), *shape.pose.own(shown_m))[0] < 0.0:
+            return True
+    return False
 
 
 def _list(vector: Any) -> list[float]:

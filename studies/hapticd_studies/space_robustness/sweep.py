@@ -19,6 +19,9 @@ LAWS = "none,damper,tdpa,energy-cycle,ring-damping"
 
 _MOST_CASES = 20
 
+_MANY_CASES = 700
+"""From here on every process makes machine code of the laws, which takes as long as some 300 cases interpreted."""
+
 
 @dataclass(frozen=True, slots=True)
 class SpaceRobustnessPlan:
@@ -48,6 +51,7 @@ class SpaceRobustnessPlan:
             "laws": [{"label": law.label, "name": law.name, "values": dict(law.values)} for law in self.laws],
             "criterion": asdict(self.criterion),
             "sizes": block_sizes(self.count, _MOST_CASES),
+            "compiled": self.count >= _MANY_CASES,
         }
         names = tuple(sorted({law.name for law in self.laws}))
         return Job(_block, spec, block_sizes(self.count, _MOST_CASES), names, interpreted=True)
@@ -63,4 +67,4 @@ def _block(spec: dict[str, Any], block: int, _threads: int | None) -> list[Row]:
     """A row a case: what it did under the first law, then under the next."""
     laws, criterion = [LawSpec(**law) for law in spec["laws"]], Criterion(**spec["criterion"])
     cases = [draw(spec["seed"], index) for index in block_cells(spec["sizes"], block)]
-    return [[value for law in laws for value in judged(case, law, criterion)] for case in cases]
+    return [[value for law in laws for value in judged(case, law, criterion, spec["compiled"])] for case in cases]

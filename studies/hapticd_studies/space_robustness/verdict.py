@@ -15,7 +15,9 @@ import numpy as np
 
 from hapticd.offline.felt import MOVING_HZ, WINDOW_S, felt_index
 from hapticd.offline.outcome import Criterion
-from hapticd.offline.rehearsal import Rehearsal, ticks_in
+from hapticd.offline.rehearsal import ticks_in
+from hapticd.offline.track import track
+from hapticd.simulation.batch.space_kernel import TRACE_COLUMNS
 from hapticd.simulation.space.device import SpatialDevice
 from hapticd.tick.space.tick import SpaceTick
 from hapticd_studies.law_spec import LawSpec
@@ -27,6 +29,10 @@ GROWS = 1.25
 COLUMNS = ("verdict", "span_m", "limit_m", "misplaced_m", "felt_index", "peak_force_n", "damping_n_s_per_m")
 """Of each run. `span_m` is what is judged, against `limit_m`; `felt_index` is of the last second, from 40 Hz up where
 the hand moves."""
+
+
+_POSITION = slice(TRACE_COLUMNS.index("x_m"), TRACE_COLUMNS.index("z_m") + 1)
+_FORCE = slice(TRACE_COLUMNS.index("fx_n"), TRACE_COLUMNS.index("fz_n") + 1)
 
 
 class Verdict(IntEnum):
@@ -43,22 +49,22 @@ class Verdict(IntEnum):
         return ("steady", "still, but out of place", "unsteady", "stopped")[self]
 
 
-def judged(case: Case, law: LawSpec, criterion: Criterion) -> list[float]:
-    """The row of a case under a law: `COLUMNS`."""
+def judged(case: Case, law: LawSpec, criterion: Criterion, compiled: bool = False) -> list[float]:
+    """The row of a case under a law: `COLUMNS`.
+
+    Args:
+        case: the case.
+        law: the law.
+        criterion: what still and in place mean.
+        compiled: run it as machine code, which takes a while to make and gives the same numbers.
+    """
     loaded = case.loaded(law)
-    rehearsal = Rehearsal(loaded)
-    space, tick = rehearsal.space, rehearsal.tick
-    assert space is not None
-    assert isinstance(tick, SpaceTick)
-    path: list[tuple[float, ...]] = []
-    peak_n = 0.0
-    for _ in rehearsal.run(ticks_in(loaded, DURATION_S)):
-        path.append(space.position_m)
-        peak_n = max(peak_n, math.hypot(*tick.force_n))
+    tick, space, trace, fault, _ = track(loaded, ticks_in(loaded, DURATION_S), compiled)
+    peak_n = max((math.hypot(*row) for row in trace[:, _FORCE].tolist()), default=0.0)
     damping = max(contact.normal.damping_n_s_per_m for contact in tick.solids)
-    if rehearsal.fault is not None or not path:
+    if fault is not None or not len(trace):
         return [float(Verdict.STOPPED), math.inf, 0.0, math.nan, math.inf, peak_n, damping]
-    way = np.array(path)
+    way = trace[:, _POSITION]
     period_s = case.period_s
     end = way[-round(WINDOW_S / period_s) :]
     limit_m = criterion.still_limit_m(space.options)
