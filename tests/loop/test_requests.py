@@ -16,6 +16,7 @@ import pytest
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig, load, parse
 from hapticd.device import Sample
+from hapticd.loop import requests
 from hapticd.supervisor.reload import switch_request
 from hapticd.tick.event import EventCode
 from tests.loop.bench import PERIOD_S, Bench
@@ -263,3 +264,33 @@ def test_objects_come_in_by_a_switch_and_a_mesh_is_read_beside_the_loop() -> Non
         assert bench.told()[EventCode.SWITCHED].fields["config"] == mesh.hash
     finally:
         bench.close()
+
+
+def test_a_slice_does_one_thing(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To read a request, to check a table, to make a law ready: each has the time between two ticks for itself."""
+    bench.ticks(1)
+    walls = "".join(WALLS.replace("[[scene.walls]]", f"[[scene.walls]]\nposition_m = -0.0{n}") for n in (1, 2))
+    bench.shared.post(switch_request(START, configured(walls + "[controller]\nlaw = 'none'\n")))
+    slices: list[list[str]] = []
+
+    def noted(owner: Any, name: str, what: str) -> None:
+        does = getattr(owner, name)
+
+        def notes(*given: Any, **named: Any) -> Any:
+            slices[-1].append(what)
+            return does(*given, **named)
+
+        monkeypatch.setattr(owner, name, notes)
+
+    noted(bench.shared, "request", "request")
+    noted(plugins.law("none").Params, "model_validate", "parameters")
+    noted(requests, "RunningLaw", "law")
+    for table in ("SafetyConfig", "WallConfig", "SceneConfig"):
+        noted(getattr(requests, table), "model_validate", table)
+    while not bench.answered:
+        slices.append([])
+        bench.loop.requests.work()
+    done = [each for each in slices if each]
+    tables = ["SafetyConfig", "WallConfig", "WallConfig", "SceneConfig"]
+    assert done == [["request"], ["parameters"], ["law"], *([table] for table in tables)]
+    assert bench.shared.verdict() == ""
