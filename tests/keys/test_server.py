@@ -284,6 +284,18 @@ def test_an_address_of_ipv6_takes_keys_as_any_other() -> None:
         context.term()
 
 
+def test_a_hundred_strangers_are_told_of_and_the_log_grows_no_further(caplog: pytest.LogCaptureFixture) -> None:
+    """T6: a stranger has as many keys and addresses as it likes."""
+    with zmq.Context() as context, context.socket(zmq.ROUTER) as socket:
+        bound = server.CurveServer(socket, "tcp://127.0.0.1:0", SERVER, frozenset())
+        with caplog.at_level(logging.WARNING, "hapticd"):
+            for number in range(150):
+                bound._tell(f"10.0.0.{number}", STRANGER.public)
+        bound.close()
+    assert len(caplog.records) == 100
+    assert "10.0.0.99" in caplog.records[-1].getMessage()
+
+
 class Reluctant(server.CurveServer):
     """One whose port another program can take.
 
