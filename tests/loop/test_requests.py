@@ -294,3 +294,14 @@ def test_a_slice_does_one_thing(bench: Bench, monkeypatch: pytest.MonkeyPatch) -
     tables = ["SafetyConfig", "WallConfig", "WallConfig", "SceneConfig"]
     assert done == [["request"], ["parameters"], ["law"], *([table] for table in tables)]
     assert bench.shared.verdict() == ""
+
+
+@pytest.mark.parametrize("releasing", [False, True])
+def test_an_arm_that_holds_a_force_or_lets_it_go_is_not_moved_by_a_calibration(bench: Bench, releasing: bool) -> None:
+    bench.ticks(1)
+    assert bench.ask(do="arm") == ""
+    if releasing:
+        assert bench.ask(do="disarm") == ""
+        bench.ticks(5)
+    assert "hapticd disarm" in bench.ask(do="calibrate")
+    assert EventCode.CALIBRATING not in bench.told()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 from hapticd import plugins
@@ -12,6 +14,7 @@ from hapticd.supervisor.reload import switch_request
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.guard import Mode
 from hapticd.tick.record import TickRecord
+from tests.daemon.running import wait_until
 from tests.loop.clock import Clock
 from tests.loop.started import WALL, Started
 from tests.loop.test_remote_slots import at
@@ -150,3 +153,19 @@ def test_what_clients_drive_is_taken_and_told_when_it_is_let_go_and_when_it_is_b
     assert back[0].text == "tool: in force again"
     assert 201 + 100 <= stale[0].seq <= 201 + 102
     assert 400 <= back[0].seq <= 401
+
+
+def test_while_it_runs_there_is_a_thread_for_what_takes_long(clock: Clock) -> None:
+    started = Started(clock)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    before, done = set(threading.enumerate()), threading.Event()
+
+    def each_tick(number: int) -> None:
+        if number == 20:
+            started.loop.requests.worker.do(done.set)
+        if number == 21:
+            assert done.wait(20.0)
+
+    started.run(each_tick, 30)
+    assert done.is_set()
+    wait_until(lambda: set(threading.enumerate()) <= before, "the end of the thread")
