@@ -7,10 +7,13 @@ held force that amount is known beforehand: (k dt / 2) sum v^2 dt. So damping ha
     base  = leaks k dt / 2                                 leaks >= 1: what the sampled spring generates, and more where
                                                            swings do not die away (a delay, a slow actuator)
     brake = 2 ratio sqrt(k m), at most m / (2 dt)          while the contact swings by itself
+          = (4 / pi) ratio k t                             t after the touch, until the first turn
 
 A *swing* runs from one turn of the position to the next. Its half period h tells the mass, m = k (h / pi)^2, and
-whether it is the contact's own or a hand's: no hand turns within 45 ms. Nothing about the device is given. One
-decision is made a swing, none between. docs/controllers.md has the reasons and the evidence.
+whether it is the contact's own or a hand's: no hand turns within 45 ms. Nothing about the device is given. Before the
+first turn the mass is unknown; a brake that grows with the time is the full one of any mass a quarter of a period after
+the touch, and takes from an arrival where that means to push, not to pull. One decision is made a swing, none between.
+docs/controllers.md has the reasons and the evidence.
 """
 
 from __future__ import annotations
@@ -31,12 +34,13 @@ PART = 1.43  # a swing cut by the surface is 0.5 to 1 half period long
 BOUNCE = 0.5  # a whole bounce without a turn that is seen goes in and out: two such parts
 EVEN = 0.3  # half periods within three tenths are equal; quantised turns are blurred by as much
 EVEN_TICKS = 1.5  # and never known better than to a tick at each end
+QUARTER = 4.0 / PI  # ratio of k t to the full brake, a quarter of a period after the touch: 2 / w over (pi / 2) / w
 SHRINKS = 0.95  # a swing below this share of the one two before (same direction) dies away by itself
 MANY = 4.0  # cut swings without a pause: a device that bounces slowly, and not a hand that taps
 OWN = 2.5  # a swing that would need more than this many times the known mass is driven from outside
 LEARN = 0.3  # of a new mass: three swings tell another hand
 FORGET = 1.05  # growth of the mass at each quick swing that it does not explain, until it does
-SILENCE = 2.0  # in half periods: one until the next turn, and up to one until that is noticed
+SILENCE = 2.0  # inside, in half periods: one until the next turn, and up to one until that is noticed
 FLIGHT_S = 0.09  # a bounce is over sooner; a hand that taps is not back yet (about 10 Hz at most)
 STRONGER = 4.0  # the brake, for each swing that does not shrink: from least to full in five
 PATIENCE = 2.0  # full swings that do not shrink before the brake is halved instead: too much damping rings as well
@@ -45,7 +49,10 @@ BACK = 8.0
 RELAX = 0.7  # of the first brake, after each ring that died away without more than that
 MOST_OF_MASS = 0.5  # brake in m/dt: a sampled damper is unstable by itself from 2, and 0.83 with one late sample
 BASE_OF_MASS = 0.45  # the same for the base, which also has to suit two late samples (0.54)
-GROWTH = 1.15  # of the base a swing; slow enough that the last step is no more than a sixth too much
+GROWTH = 1.3  # of the base a swing: a step beyond the last one that was seen not to do, and within half too much
+EVIDENCE = 0.3  # that a swing of one turn threshold did not shrink; of counts, a fading ring repeats a few
+ENOUGH = 1.2  # of it in a row before the base grows: two large swings, or four of two counts
+UNEVEN = 3.0  # in turn thresholds: swings as long as this are no noise, even or not
 ARRIVAL = 6.0  # swings of a contact before its base may grow: an arrival has died away by then
 SLOWER = 0.9  # of the base, for each swing of a hand: this wall is being used and does not ring
 LEFT = 0.5  # of the base, for each time the device has left for good
@@ -59,7 +66,7 @@ class Params(LawParams):
     hand_half_period_s: float = Field(
         0.045, gt=0.0, le=10.0, description="a swing longer than this may be the hand's and is not braked [s]"
     )
-    brake_ratio: float = Field(0.6, ge=0.0, le=2.0, description="damping ratio of the full brake; 0: none")
+    brake_ratio: float = Field(0.7, ge=0.0, le=2.0, description="damping ratio of the full brake; 0: none")
     least_brake_ratio: float = Field(
         0.002,
         ge=0.0,
@@ -77,6 +84,7 @@ class State:
 
     damping_n_s_per_m: float  # base and brake now; outside the wall the base
     base_n_s_per_m: float  # learned: what stays between rings
+    leak_n_s_per_m: float  # k dt / 2 where it was last in the wall
     felt_mass_kg: float  # learned: what the wall swings; 0 while unknown
     leaks: float  # base in k dt / 2; 0 until the first contact
     first_brake: float  # learned: damping ratio that a ring starts with
@@ -84,11 +92,13 @@ class State:
     swings: float  # own swings of this ring
     stubborn: float  # those among them that were loud and did not shrink
     age: float  # own swings since the device came
+    steady: float  # evidence of those in a row that did not shrink
     noise_m: float  # mean change of the move from tick to tick
     last_moved_m: float
     was_in_contact: bool
     outward: bool  # direction of the swing that runs
     whole: bool  # whether it began with a turn, and not at the surface
+    arrives: bool  # whether it is the way in from the surface, and nothing rings yet
     from_m: float  # where it began
     far_m: float  # how far it has come
     far_s: float  # when, from its beginning
@@ -103,6 +113,7 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     """Take over: the damping of the law before is a base to begin with, never a brake."""
     state.base_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
     state.damping_n_s_per_m = state.base_n_s_per_m
+    state.leak_n_s_per_m = 0.0
     state.felt_mass_kg = 0.0
     state.leaks = 0.0
     state.first_brake = params.brake_ratio
@@ -110,6 +121,7 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.swings = 0.0
     state.stubborn = 0.0
     state.age = 0.0
+    state.steady = 0.0
     state.noise_m = 0.0
     state.last_moved_m = 0.0
     state.was_in_contact = snapshot.x_m < 0.0
@@ -135,6 +147,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
             _inherit(state, stiffness, tick.dt_s)
         if not state.was_in_contact:
             _begin(state, 0.0, False, False)
+            state.arrives = state.swings == 0.0
         _follow(state, params, tick, turn_m, stiffness)
     elif state.was_in_contact:
         _leave(state, params, tick, turn_m)
@@ -142,7 +155,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
     _listen(state, params, tick.in_contact)
     if not tick.in_contact:
         return 0.0
-    _set_damping(state, stiffness, tick.dt_s)
+    _set_damping(state, params, stiffness, tick.dt_s)
     force_n: float = tick.contact_n - state.damping_n_s_per_m * tick.velocity_m_per_s  # eq. 9
     if force_n < 0.0 and state.stubborn < params.pull_after:
         force_n = max(force_n, min(0.0, tick.contact_n))  # a wall does not hold on to who leaves
@@ -173,6 +186,7 @@ def _begin(state: Any, from_m: float, outward: bool, whole: bool) -> None:
     state.swing_s = 0.0
     state.outward = outward
     state.whole = whole
+    state.arrives = False
 
 
 def _follow(state: Any, params: Any, tick: Any, turn_m: float, stiffness: float) -> None:
@@ -227,11 +241,15 @@ def _end(
     if (quick or own) and loud and mass_kg > 0.0:
         _feel(state, mass_kg, own, whole)
     if own:
-        alike = even and whole and state.last_whole
+        alike = whole and state.last_whole and (even or length_m > UNEVEN * turn_m)
         bounces = not whole and state.swings >= 2.0 and length_m > turn_m
         state.age += 1.0
-        if not shrinks and (alike or bounces) and state.age > ARRIVAL:
-            state.leaks = min(MOST_LEAKS, GROWTH * state.leaks)
+        if shrinks:
+            state.steady = 0.0
+        elif (alike or bounces) and state.age > ARRIVAL:
+            state.steady += min(1.0, EVIDENCE * length_m / turn_m)
+            if state.steady > ENOUGH:
+                state.leaks = min(MOST_LEAKS, GROWTH * state.leaks)
         if loud:
             if state.swings >= 2.0 and not shrinks:
                 state.stubborn += 1.0
@@ -279,12 +297,9 @@ def _brake(state: Any, params: Any) -> None:
 
 def _listen(state: Any, params: Any, in_contact: bool) -> None:
     """Silence ends the ring, and with it the brake; the next ring begins with less if this one was harmless."""
-    if state.swing_s <= SILENCE * state.last_s or state.last_s == 0.0:
+    if state.last_s == 0.0 or state.swing_s <= (SILENCE * state.last_s if in_contact else FLIGHT_S):
         return
-    if in_contact:
-        if state.brake == 0.0 and state.swings == 0.0:
-            return
-    elif state.swing_s <= FLIGHT_S:
+    if in_contact and state.brake == 0.0 and state.swings == 0.0:
         return
     state.brake = 0.0
     if state.swings > 0.0 and state.stubborn == 0.0:
@@ -297,6 +312,7 @@ def _listen(state: Any, params: Any, in_contact: bool) -> None:
         state.leaks = max(1.0, LEFT * state.leaks)
         state.last_s = 0.0
         state.age = 0.0
+        state.base_n_s_per_m = min(state.base_n_s_per_m, state.leaks * state.leak_n_s_per_m)
         state.damping_n_s_per_m = state.base_n_s_per_m
 
 
@@ -311,19 +327,30 @@ def _inherit(state: Any, stiffness: float, dt_s: float) -> None:
         state.leaks = max(1.0, min(INHERITED, state.base_n_s_per_m / leak))
 
 
-def _set_damping(state: Any, stiffness: float, dt_s: float) -> None:
+def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None:
     """Base and brake at the stiffness of now, so that both soften with the wall."""
     leak = 0.5 * stiffness * dt_s
     base = leak * state.leaks
     mass_kg = state.felt_mass_kg
     if state.leaks > 1.0 and mass_kg > 0.0:
         base = max(leak, min(base, BASE_OF_MASS * mass_kg / dt_s))
+    state.leak_n_s_per_m = leak
     state.base_n_s_per_m = base
+    damping = base
     if state.brake > 0.0:
-        brake = min(2.0 * state.brake * sqrt(stiffness * mass_kg), MOST_OF_MASS * mass_kg / dt_s)
-        state.damping_n_s_per_m = _bounded(base + brake)
-    else:
-        state.damping_n_s_per_m = base
+        damping = _bounded(base + _full(state, state.brake, stiffness, dt_s))
+    elif state.arrives and state.swing_s <= params.hand_half_period_s:
+        brake = QUARTER * state.first_brake * stiffness * state.swing_s
+        if mass_kg > 0.0:
+            brake = min(brake, _full(state, state.first_brake, stiffness, dt_s))
+        damping = _bounded(base + brake)
+    state.damping_n_s_per_m = damping
+
+
+def _full(state: Any, ratio: float, stiffness: float, dt_s: float) -> float:
+    """A brake of this damping ratio, as far as a sampled one may go."""
+    mass_kg: float = state.felt_mass_kg
+    return min(2.0 * ratio * sqrt(stiffness * mass_kg), MOST_OF_MASS * mass_kg / dt_s)
 
 
 def _bounded(value: float) -> float:

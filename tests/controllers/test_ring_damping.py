@@ -84,6 +84,50 @@ def test_the_brake_relaxes_while_rings_die_away_by_themselves() -> None:
     assert rig.state.first_brake < 0.1 * fresh
 
 
+def test_an_arrival_is_braked_by_as_much_as_its_time_and_only_until_the_first_turn() -> None:
+    """A quarter of a period after the touch it is the full brake of the device's mass, which no law can know yet."""
+    rig, params = rig_on(SOFT), Params()
+    rig.run(0.002)
+    seen, damping = 0, []
+    while rig.tick.velocity_m_per_s <= 0.0 or not rig.tick.in_contact:
+        rig.run(1e-3)
+        if rig.tick.in_contact:
+            seen += 1
+            damping.append(rig.state.damping_n_s_per_m - leak(SOFT))
+    assert damping == sorted(damping)
+    quarter = 0.5 * math.pi * math.sqrt(SOFT.mass_kg / SOFT.stiffness_n_per_m)
+    full = 2.0 * params.brake_ratio * math.sqrt(SOFT.mass_kg * SOFT.stiffness_n_per_m)
+    assert damping[round(quarter / 1e-3)] == pytest.approx(full, rel=0.15)
+    assert seen < 45
+
+
+def test_a_hand_that_goes_on_pressing_is_let_through_after_its_half_period() -> None:
+    rig = rig_on(replace(SOFT, hand_n=0.0, x_m=1e-5, resolution_m=1e-6))
+    seen = []
+    for at in range(200):
+        rig.change(hand_n=-0.03 * at)
+        seen += ticks(rig, 1)
+    inside = [damping for x_m, _, damping, _ in seen if x_m < 0.0]
+    assert max(inside[:45]) > 10.0 * leak(SOFT)
+    assert max(inside[-20:]) == pytest.approx(leak(SOFT))
+
+
+def test_the_base_that_is_published_outside_is_the_one_that_the_next_touch_gets() -> None:
+    """What leaving has halved is known at once, and not only in the wall: a switch or a new start takes it along."""
+    rig = rig_on(replace(SOFT, hand_n=-1.0))
+    ring_damping.start(rig.state, rig.params, LawSnapshot(damping_n_s_per_m=150.0))
+    rig.run(0.2)
+    before = rig.state.base_n_s_per_m
+    rig.change(hand_n=1.0)
+    rig.run(0.2)
+    outside = rig.state.base_n_s_per_m
+    assert leak(SOFT) < outside <= 0.5 * before
+    rig.change(hand_n=-6.0, v_m_per_s=0.0, x_m=2e-5)
+    while not rig.tick.in_contact:
+        rig.run(1e-3)
+    assert rig.state.base_n_s_per_m == pytest.approx(outside)
+
+
 def test_a_stroke_of_the_hand_is_not_braked() -> None:
     """2 Hz, 250 ms from turn to turn, against a ring of 20 Hz that looks alike otherwise."""
     seen = watched([-1e-3 + 5e-4 * math.sin(math.tau * 2.0 * at * 1e-3) for at in range(4000)])
@@ -191,7 +235,7 @@ def test_the_swing_tells_the_mass(mass_kg: float) -> None:
 
 
 def test_damping_of_the_law_before_becomes_a_base_and_never_a_spike() -> None:
-    rig = rig_on(SOFT)
+    rig = rig_on(SOFT, Params(brake_ratio=0.0, least_brake_ratio=0.0))
     ring_damping.start(rig.state, rig.params, LawSnapshot(damping_n_s_per_m=150.0))
     largest = max(damping for x_m, _, damping, brake in ticks(rig, 5) if x_m < 0.0)
     assert largest == pytest.approx(4.0 * leak(SOFT))
