@@ -11,6 +11,7 @@ import contextlib
 import logging
 import os
 import resource
+import select
 import socket as sockets
 import struct
 import threading
@@ -172,6 +173,28 @@ def local_peer(descriptor: int) -> str:
         process, user, _group = struct.unpack(_CREDENTIALS, said)
         return f"user {user}, process {process}"
     return ""
+
+
+def inode_of(descriptor: int) -> int:
+    """What tells a connection from the next one that has its descriptor; 0 when it has ended."""
+    try:
+        return os.fstat(descriptor).st_ino
+    except OSError:
+        return 0
+
+
+def has_ended(descriptor: int, inode: int) -> bool:
+    """Whether a connection has ended, also before ZeroMQ has seen that: its other end is closed.
+
+    Args:
+        descriptor: of it, as ZeroMQ tells with a message.
+        inode: what `inode_of` said of it.
+    """
+    if inode_of(descriptor) != inode or not inode:
+        return True
+    look = select.poll()
+    look.register(descriptor, select.POLLRDHUP)
+    return bool(look.poll(0))
 
 
 def _enough(limit: int) -> bool:

@@ -23,12 +23,14 @@ class Sender:
     Attributes:
         identity: of its connection, as ZeroMQ has it.
         descriptor: of its connection.
+        inode: of its connection, since a descriptor may be another connection's soon after.
         local: it is on this computer, so that its CLOCK_MONOTONIC is ours.
         name: for people.
     """
 
     identity: bytes
     descriptor: int
+    inode: int
     local: bool
     name: str
 
@@ -46,6 +48,7 @@ class LeasedPort:
 
     Attributes:
         limits: what it is.
+        lease_s: how long a client that says nothing keeps it [s].
         update: all that its owner has said.
         owner: the client that it belongs to; None: to none.
         messages: taken.
@@ -57,6 +60,7 @@ class LeasedPort:
 
     def __init__(self, limits: PortLimits, lease_s: float) -> None:
         self.limits = limits
+        self.lease_s = lease_s
         self.update = Update()
         self.owner: Sender | None = None
         self.messages = 0
@@ -64,13 +68,12 @@ class LeasedPort:
         self.refused = 0
         self.ages = DelayHistogram()
         self.round_trips = DelayHistogram()
-        self._lease_ns = round(lease_s * 1e9)
         self._under_way: deque[tuple[int, int, int]] = deque(maxlen=_REMEMBERED)
         self._in_force = -1
 
     def owner_at(self, now_ns: int) -> Sender | None:
         """Whom the port belongs to now."""
-        if self.owner is not None and now_ns - self.update.received_ns > self._lease_ns:
+        if self.owner is not None and now_ns - self.update.received_ns > self.lease_s * 1e9:
             self.owner = None
         return self.owner
 
@@ -90,8 +93,7 @@ class LeasedPort:
         owner = self.owner_at(now_ns)
         if owner is not None and owner.identity != sender.identity:
             raise NotTakenError(
-                f"{self.limits.name} belongs to {owner.name}, until it lets go or is silent for "
-                f"{self._lease_ns * 1e-9:g} s"
+                f"{self.limits.name} belongs to {owner.name}, until it lets go or is silent for {self.lease_s:g} s"
             )
         if fields.get("release") is True:
             return self._release(now_ns)

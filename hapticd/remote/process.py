@@ -1,8 +1,9 @@
 """The remote process: what runs behind `python -m hapticd.remote.process`.
 
-It hears the clients of the scene and streams them each tick, at normal priority and off the loop's processor where
-there is another. The supervisor starts it with one end of a socket pair as its descriptor `--socket`: settings come in
-over that, the loop's memory with them, and a sign of life with what was counted goes out each second.
+It hears the clients of the scene and streams them each tick, off the loop's processor where there is another, and there
+at the lowest real-time priority, so that no ordinary program comes between a tick and those who wait for it; while it is
+flooded it is an ordinary one. The supervisor starts it with one end of a socket pair as its descriptor `--socket`:
+settings come in over that, the loop's memory with them, and a sign of life with what was counted goes out each second.
 
 One thread. It sleeps until the next tick ought to be done and then looks, in naps of a few microseconds, whether it is,
 so that the loop need not wake it; a message of a client ends any sleep.
@@ -31,6 +32,7 @@ from hapticd.loop.memory import RecordReader, SharedMemory
 from hapticd.loop.realtime import die_with_parent, sleep_exactly
 from hapticd.loop.remote_slots import SlotWriter
 from hapticd.paths import SCENE, STATE
+from hapticd.remote.priority import Priority
 from hapticd.remote.scene_socket import SceneSocket
 from hapticd.remote.settings import SETTINGS, RemoteSettings, unpacked
 from hapticd.remote.state_map import ports_of, state_map
@@ -38,13 +40,16 @@ from hapticd.remote.state_socket import StateSocket
 from hapticd.tick.record import RecordLayout, TickRecord
 
 NAP_S = 2e-5
-"""How long to sleep between two looks for a tick that is due [s]."""
+"""How long to sleep between two looks for a tick that is due [s]; for one that is late a tenth of how late it is."""
 
 IDLE_S = 0.01
-"""The same while it is not told to any client, or is late [s]."""
+"""The same at most, and while it is not told to any client [s]."""
 
 STATUS_S = 1.0
 """Time between two reports of the counts to the supervisor [s]."""
+
+SOONEST_S = 0.1
+"""The same when a client has come or gone [s]."""
 
 _MOST_BEHIND = 100  # ticks that are told late; of those before them clients see the gap
 _EARLY_NS = 20_000
@@ -74,6 +79,7 @@ class RemoteServer:
 
     def __init__(self, channel: socket.socket, settings: RemoteSettings, descriptor: int) -> None:
         self._channel = channel
+        self._priority = Priority(settings.realtime)  # before ZeroMQ has threads, which inherit it
         directory = Path(settings.directory)
         self._scene = SceneSocket(directory / SCENE, settings.scene_tcp, settings.ring)
         try:
@@ -83,7 +89,8 @@ class RemoteServer:
             raise
         self._memory = _Memory(settings, descriptor)
         self._serve(settings)
-        self._status_due_ns = 0
+        self._reported_ns = 0
+        self._owners: list[str] = []
         self._house_due_ns = 0
         self._due_ns = time.monotonic_ns()
         self._lead_ns = 0.0
@@ -95,16 +102,19 @@ class RemoteServer:
         waiting = [scene, channel]
         while True:
             more = self._scene.receive()
+            looked_ns = time.monotonic_ns()
             self._tell()
             now_ns = time.monotonic_ns()
             if now_ns >= self._house_due_ns:
                 self._house_due_ns = now_ns + int(IDLE_S * 1e9)
                 self._scene.turn()
                 self._state.turn()
+                self._priority.turn(now_ns)
                 self._report(now_ns)
             if more:
+                self._priority.flooded(now_ns)
                 continue
-            ready, _, _ = select.select(waiting, (), (), self._pause_s())
+            ready, _, _ = select.select(waiting, (), (), self._pause_s(looked_ns))
             if channel in ready and not self._hear():
                 return
 
@@ -127,14 +137,15 @@ class RemoteServer:
             return
         # A list that is another one by now may have been it already in these ticks.
         known = self._scene.ports if self._memory.slots.in_force else {}
-        ports = list(known.values())
-        for record in records:
-            done_ns = record.deadline_ns + int((record.late_us + record.busy_us) * 1e3)
-            for recorded in ports_of(record) if ports else ():
-                ports[recorded.index].now_in_force(recorded.seq, record.seq, done_ns, self._period_ns)
         if self._state.subscribed:
+            names = tuple(known)
             for record in records[-_MOST_BEHIND:]:
-                self._state.send(state_map(record, tuple(known), self._settings.epoch_offset_ns))
+                self._state.send(state_map(record, names, self._settings.epoch_offset_ns))
+        ports = list(known.values())
+        for record in records if ports else ():
+            done_ns = record.deadline_ns + int((record.late_us + record.busy_us) * 1e3)
+            for recorded in ports_of(record):
+                ports[recorded.index].now_in_force(recorded.seq, record.seq, done_ns, self._period_ns)
         self._expect(records[-1])
 
     def _expect(self, last: TickRecord) -> None:
@@ -143,13 +154,18 @@ class RemoteServer:
         self._lead_ns += 0.1 * (min(took_ns, 0.5 * self._period_ns) - self._lead_ns)
         self._due_ns = last.deadline_ns + self._period_ns + max(0, int(self._lead_ns) - _EARLY_NS)
 
-    def _pause_s(self) -> float:
+    def _pause_s(self, looked_ns: int) -> float:
+        """How long to sleep [s].
+
+        Args:
+            looked_ns: when the last look for a tick was taken; how late a tick is says that, and not how late we are.
+        """
         if not self._state.subscribed:
             return IDLE_S
         left_ns = self._due_ns - time.monotonic_ns()
         if left_ns > 0:
             return left_ns * 1e-9
-        return NAP_S if left_ns > -2 * self._period_ns else IDLE_S
+        return min(max(NAP_S, (looked_ns - self._due_ns) * 1e-10), IDLE_S)
 
     def _hear(self) -> bool:
         """Go on as the supervisor says, with another list of ports, loop or keys; False when it has gone."""
@@ -158,20 +174,24 @@ class RemoteServer:
             return False
         before, self._memory = self._memory, _Memory(*said)
         self._serve(said[0])
+        self._reported_ns = 0
         before.shared.close()
         return True
 
     def _report(self, now_ns: int) -> None:
-        """Show the supervisor that we live, and what was counted."""
-        if now_ns < self._status_due_ns:
+        """Show the supervisor that we live, what was counted, and soon when a client has come or gone."""
+        if now_ns - self._reported_ns < SOONEST_S * 1e9:
             return
-        self._status_due_ns = now_ns + int(STATUS_S * 1e9)
+        owners = self._scene.owners()
+        if owners == self._owners and now_ns - self._reported_ns < STATUS_S * 1e9:
+            return
+        self._reported_ns = now_ns
+        self._owners = owners
         ports = list(self._scene.ports.values())
-        owners = [port.owner_at(now_ns) for port in ports]
         said: dict[str, Any] = {
             "remote_name": [port.limits.name for port in ports],
             "remote_kind": [port.limits.kind for port in ports],
-            "remote_owner": [owner.name if owner else "" for owner in owners],
+            "remote_owner": owners,
             "remote_messages": [port.messages for port in ports],
             "remote_refused": [port.refused for port in ports],
             "remote_late": [port.late for port in ports],

@@ -1,13 +1,12 @@
 """What clients say of the scene: a ROUTER, with a lease a name and a bound on everything.
 
 A message is one msgpack map. What is refused is counted and answered, once a second a client at most, and nothing that
-arrives can raise.
+arrives can raise. A client whose connection has ended has no lease: the next one may be the same program, started again.
 """
 
 from __future__ import annotations
 
 import contextlib
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -18,11 +17,13 @@ import msgpack
 import zmq
 
 from hapticd.config.ports import PortLimits
+from hapticd.keys.connections import has_ended, inode_of
 from hapticd.keys.store import KeyRing
 from hapticd.loop.remote_slots import SlotWriter
 from hapticd.remote.bound_socket import BoundSocket
 from hapticd.remote.leased_port import LeasedPort, NotTakenError, Sender
 from hapticd.remote.message import WrongMessageError
+from hapticd.remote.refusals import Refusal, Refusals
 
 SCHEMA = 1
 """Version of what scene and state sockets speak; goes up only when a key changes its meaning or goes."""
@@ -32,8 +33,6 @@ MOST_AT_ONCE = 50
 
 _LARGEST_MESSAGE = 1 << 12  # bytes
 _MOST_UNREAD = 100  # messages of a client
-_ANSWER_NS = 1_000_000_000
-_MOST_ANSWERED = 512  # clients whose last answer is remembered
 
 
 class SceneSocket:
@@ -72,7 +71,7 @@ class SceneSocket:
         self._writer: SlotWriter | None = None
         self._axes: tuple[str, ...] = ()
         self._hello: dict[str, Any] = {}
-        self._answered_ns: dict[bytes, int] = {}
+        self._refusals = Refusals(self._refuse)
 
     def serve(
         self, limits: Sequence[PortLimits], writer: SlotWriter, lease_s: float, axes: tuple[str, ...], rate_hz: float
@@ -93,6 +92,7 @@ class SceneSocket:
             if port is None or port.limits.kind != each.kind:
                 port = LeasedPort(each, lease_s)
             port.limits = each
+            port.lease_s = lease_s
             self.ports[each.name] = port
         self._slots = {each.name: index for index, each in enumerate(limits)}
         self._writer = writer
@@ -111,8 +111,20 @@ class SceneSocket:
         self._bound.admit(ring)
 
     def turn(self) -> None:
-        """Let those in who have a key. Returns at once."""
+        """Let those in who have a key, and tell refusals that have waited. Returns at once."""
         self._bound.turn()
+        self._refusals.turn(time.monotonic_ns())
+
+    def owners(self) -> list[str]:
+        """Whom each port belongs to now, for people; "" where there is no one."""
+        now_ns = time.monotonic_ns()
+        found = []
+        for port in self.ports.values():
+            owner = port.owner_at(now_ns)
+            if owner is not None and has_ended(owner.descriptor, owner.inode):
+                port.owner = owner = None
+            found.append(owner.name if owner is not None else "")
+        return found
 
     def receive(self) -> bool:
         """Take what has come, at most `MOST_AT_ONCE` messages; whether more may wait."""
@@ -136,7 +148,7 @@ class SceneSocket:
         if fields is None:
             self.strays += 1
             self._bound.connections.odd(int(frames[-1].get(zmq.SRCFD)) if frames else -1)
-            self._refuse(identity, "", "a message is one msgpack map with texts as keys", now_ns)
+            self._refusals.add(identity, Refusal("", "a message is one msgpack map with texts as keys"), now_ns)
             return
         descriptor = int(frames[0].get(zmq.SRCFD))
         self._bound.connections.heard(descriptor)
@@ -148,14 +160,17 @@ class SceneSocket:
         if port is None:
             self.strays += 1
             known = ", ".join(self.ports) or "nothing"
-            self._refuse(identity, str(name)[:40], f"no such name in the scene; there is {known}", now_ns)
+            refusal = Refusal(str(name)[:40], f"no such name in the scene; there is {known}")
+            self._refusals.add(identity, refusal, now_ns)
             return
         try:
             if port.take(fields, self._sender(port, identity, descriptor, frames[0]), len(self._axes), now_ns):
                 self._write(port)
+            self._refusals.taken(identity, port.limits.name)
         except (NotTakenError, WrongMessageError) as error:
             port.refused += 1
-            self._refuse(identity, port.limits.name, str(error), now_ns)
+            passing = isinstance(error, NotTakenError)
+            self._refusals.add(identity, Refusal(port.limits.name, str(error), passing), now_ns)
 
     def _sender(self, port: LeasedPort, identity: bytes, descriptor: int, frame: zmq.Frame) -> Sender:
         """Who sent a message; looked up only where it is not the owner of its port, whom we know.
@@ -168,37 +183,22 @@ class SceneSocket:
         if (
             owner is not None
             and owner.identity != identity
-            and (owner.descriptor == descriptor or _closed(owner.descriptor))
+            and (owner.descriptor == descriptor or has_ended(owner.descriptor, owner.inode))
         ):
             port.owner = None
         local, name = self._bound.peer(frame)
-        return Sender(identity, descriptor, local, name)
+        return Sender(identity, descriptor, inode_of(descriptor), local, name)
 
     def _write(self, port: LeasedPort) -> None:
         assert self._writer is not None
         self._writer.write(self._slots[port.limits.name], port.update)
 
-    def _refuse(self, identity: bytes, name: str, text: str, now_ns: int) -> None:
-        """Say why not, unless this client was told something a moment ago."""
-        if now_ns - self._answered_ns.get(identity, -_ANSWER_NS) < _ANSWER_NS:
-            return
-        self._answered_ns.pop(identity, None)
-        self._answered_ns[identity] = now_ns
-        if len(self._answered_ns) > _MOST_ANSWERED:
-            del self._answered_ns[next(iter(self._answered_ns))]
-        self._send(identity, {"ok": False, "name": name, "text": text})
+    def _refuse(self, identity: bytes, refusal: Refusal) -> None:
+        self._send(identity, {"ok": False, "name": refusal.name, "text": refusal.text})
 
     def _send(self, identity: bytes, answer: Mapping[str, Any]) -> None:
         with contextlib.suppress(zmq.ZMQError):  # who is answered has gone
             self._bound.socket.send_multipart((identity, msgpack.packb(answer)), zmq.NOBLOCK)
-
-
-def _closed(descriptor: int) -> bool:
-    try:
-        os.fstat(descriptor)
-    except OSError:
-        return True
-    return False
 
 
 def _decoded(frames: Sequence[zmq.Frame]) -> dict[str, Any] | None:

@@ -36,6 +36,7 @@ class RemoteSettings:
         epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
         ports: what clients may drive, in the order of the scene.
         cpus: processors to stay on; empty: any.
+        realtime: it may take a real-time priority there.
     """
 
     version: str
@@ -50,6 +51,7 @@ class RemoteSettings:
     epoch_offset_ns: int
     ports: tuple[PortLimits, ...]
     cpus: tuple[int, ...]
+    realtime: bool
 
     def packed(self) -> bytes:
         """As bytes."""

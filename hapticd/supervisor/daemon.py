@@ -182,6 +182,7 @@ class Daemon:
             log.warning("%s", self._few_descriptors)
         for note in state.loop.info.notes:
             log.warning("%s", note)
+        self._publish_status()  # a request that has come already is answered by it
         while self.exit_code is None:
             self._turn()
             await asyncio.sleep(pause_s(state.publisher.flush_due_ns, time.monotonic_ns()))
@@ -212,9 +213,10 @@ class Daemon:
         if now_s >= state.status_due_s:
             self._look_after_helper()
             self._follow_clock()
-        if (now_s >= state.status_due_s or state.event_log.news) and self.exit_code is None:
+        news = state.event_log.news or state.remote.news
+        if (now_s >= state.status_due_s or news) and self.exit_code is None:
             state.status_due_s = now_s + STATUS_S
-            state.event_log.news = False
+            state.event_log.news = state.remote.news = False
             self._publish_status()
 
     def _publish(self) -> int:

@@ -26,6 +26,7 @@ LIVE: Final = (
     "telemetry.batch_ticks",
     "telemetry.every_ticks",
     "telemetry.input_every_tick",
+    "remote.lease_s",
     "faults",
     "service",
 )

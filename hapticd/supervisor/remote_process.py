@@ -52,10 +52,12 @@ class RemoteProcess:
 
     Attributes:
         counts: what it counted, by the fields of the status.
+        news: a client has come or gone since this was last set to False.
     """
 
     def __init__(self, directory: Path) -> None:
         self.counts: dict[str, Any] = _none_of([])
+        self.news = False
         self._directory = directory
         self._ports: list[PortLimits] = []
         self._process: subprocess.Popen[bytes] | None = None
@@ -105,6 +107,7 @@ class RemoteProcess:
             epoch_offset_ns=epoch_offset_ns,
             ports=tuple(self._ports),
             cpus=tuple(sorted(cpus)),
+            realtime=loop.realtime and bool(cpus),
         ).packed()
         self._descriptor = loop.shared.descriptor
         if self._process is None:
@@ -149,6 +152,7 @@ class RemoteProcess:
             if "error" in said:
                 trouble = said["error"]
             elif said.get("remote_name") == self.counts["remote_name"]:  # else it is of the scene before
+                self.news = self.news or said["remote_owner"] != self.counts["remote_owner"]
                 self.counts = said
         code = self._process.poll()
         if code is None and now_s - self._heard_s <= SILENT_S:

@@ -144,6 +144,7 @@ SUPERVISOR = {
     "telemetry.batch_ticks": "[telemetry]\nbatch_ticks = 5\n",
     "telemetry.every_ticks": "[telemetry]\nevery_ticks = 2\n",
     "telemetry.input_every_tick": "[telemetry]\ninput_every_tick = true\n",
+    "remote.lease_s": "[remote]\nlease_s = 2.0\n",
     "faults.keep": "[faults]\nkeep = 3\n",
     "service.reload_on_save": "[service]\nreload_on_save = true\n",
 }
@@ -170,7 +171,6 @@ RESTART = {
     "remote.params": f"{DEVICE}[remote.params]\nwindow = 3\n",
     "remote.scene_tcp": f"{DEVICE}[remote]\nscene_tcp = 'tcp://127.0.0.1:9868'\n",
     "remote.state_tcp": f"{DEVICE}[remote]\nstate_tcp = 'tcp://127.0.0.1:9869'\n",
-    "remote.lease_s": f"{DEVICE}[remote]\nlease_s = 2.0\n",
 }
 """What is refused."""
 

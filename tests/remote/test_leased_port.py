@@ -11,9 +11,9 @@ from hapticd.remote.message import WrongMessageError
 from hapticd.tick.remote.update import POSITION, RELEASED, STIFFNESS
 from tests.remote.heard import TOOL
 
-ONE = Sender(b"one", 7, True, "user 1000, process 1")
-TWO = Sender(b"two", 8, True, "user 1000, process 2")
-AFAR = Sender(b"afar", 9, False, "anna at 10.0.0.2")
+ONE = Sender(b"one", 7, 70, True, "user 1000, process 1")
+TWO = Sender(b"two", 8, 80, True, "user 1000, process 2")
+AFAR = Sender(b"afar", 9, 90, False, "anna at 10.0.0.2")
 MS = 1_000_000
 LEASE_S = 1.0
 

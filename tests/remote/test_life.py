@@ -9,11 +9,13 @@ import socket
 import subprocess
 from pathlib import Path
 
+import msgpack
 import pytest
+import zmq
 
 import hapticd
 from hapticd.client import ClientError, RefusedKeyError, RemotePort
-from hapticd.client.commands import RefusedConfigError
+from hapticd.client.commands import RefusedError
 from hapticd.keys.file import Key, new_pair, write
 from hapticd.keys.store import KeyDirectory
 from hapticd.tick.event import EventCode
@@ -49,9 +51,13 @@ def test_it_comes_and_goes_with_what_clients_may_drive_and_keeps_their_names(mon
                 wait_until(lambda: shows_both_while_driven(tool), "a status of what is driven, each second one")
             assert remote_pid(daemon) == first
 
-            daemon.config.write_text(CONFIG + "[remote]\nlease_s = 2.0\n")
-            with pytest.raises(RefusedConfigError, match=r"remote\.lease_s = 2\.0: needs a restart"):
-                client.reload()
+            daemon.config.write_text(CONFIG + "[remote]\nlease_s = 7.5\n")
+            client.reload()
+            with driven(daemon) as tool, driven(daemon) as other:
+                hold(tool, 0.001)
+                other.move([0.0])
+                with pytest.raises(RefusedError, match=r"until it lets go or is silent for 7\.5 s"):
+                    hold(other, 0.0)
             daemon.config.write_text(NOTHING_TO_DRIVE)
             client.reload()
             wait_until(lambda: gone(first), "the process to end")
@@ -65,6 +71,33 @@ def shows_both_while_driven(tool: RemotePort) -> bool:
     assert re.search(r"^  force field: (driven by .+|no client), \d+ messages, 0 refused$", shown, re.M)
     driver = rf"user {os.getuid()}, process {os.getpid()}"
     return bool(re.search(rf"^  coupling tool: driven by {driver}, [1-9]\d* messages, 0 refused$", shown, re.M))
+
+
+def classes(pid: int) -> set[int]:
+    """Scheduling classes of a process's threads."""
+    return {os.sched_getscheduler(int(task.name)) for task in Path(f"/proc/{pid}/task").iterdir()}
+
+
+def test_it_is_real_time_where_the_loop_is_and_not_while_it_is_flooded() -> None:
+    with Daemon(CONFIG).wait_ready() as daemon, driven(daemon) as tool:
+        hold(tool, 0.001)
+        loop = os.sched_getscheduler(daemon.control_pid()) & ~os.SCHED_RESET_ON_FORK
+        alone = len(os.sched_getaffinity(0)) == 1
+        pid = remote_pid(daemon)
+        assert classes(pid) == {os.SCHED_OTHER if alone else loop}
+        assert os.sched_getparam(pid).sched_priority <= 1 < os.sched_getparam(daemon.control_pid()).sched_priority
+        context = zmq.Context()
+        with context, context.socket(zmq.DEALER) as flood:
+            flood.connect(f"ipc://{runtime(daemon)}/scene")
+            flood.setsockopt(zmq.LINGER, 0)
+
+            def is_ordinary() -> bool:
+                for _ in range(1000):
+                    flood.send(msgpack.packb({"name": "tool", "seq": 1}))
+                return classes(pid) == {os.SCHED_OTHER}
+
+            wait_until(is_ordinary, "an ordinary process")
+        wait_until(lambda: classes(pid) == {os.SCHED_OTHER if alone else loop}, "the flood to be over")
 
 
 def test_a_killed_supervisor_leaves_no_process_behind() -> None:
