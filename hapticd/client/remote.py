@@ -300,6 +300,7 @@ class RemotePort:
         if self._to_scene.wait(0.0):
             answer = msgpack.unpackb(self._sending.recv())
             if not answer["ok"]:
+                self._said.pop(answer.get("key"), None)  # or all that is said from now on would be refused with it
                 raise RefusedError(f"{self.name}: {answer['text']}")
 
     def _take(self) -> RemoteState:

@@ -65,7 +65,13 @@ class Said:
 
 
 class WrongMessageError(Exception):
-    """The message says what cannot be; nothing of it is taken."""
+    """The message says what cannot be; nothing of it is taken.
+
+    Attributes:
+        key: of the message that is wrong; "" where it is none by itself.
+    """
+
+    key = ""
 
 
 def examine(fields: Mapping[str, Any], port: PortLimits, axes: int) -> Said:
@@ -90,7 +96,11 @@ def examine(fields: Mapping[str, Any], port: PortLimits, axes: int) -> Said:
             continue
         if key not in known:
             raise WrongMessageError(f"{port.name} is a {port.kind} and has no {key[:40]}: it takes {', '.join(known)}")
-        values[key] = _value(key, value, port, axes)
+        try:
+            values[key] = _value(key, value, port, axes)
+        except WrongMessageError as error:
+            error.key = key
+            raise
         bits |= known[key]
     return Said(seq, sent_ns, state_seq, values, bits)
 

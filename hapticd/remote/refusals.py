@@ -21,11 +21,13 @@ class Refusal(NamedTuple):
     Attributes:
         name: of what it was for, "" when it named nothing.
         text: why not.
+        key: of the message that is wrong, "" where it is none by itself.
         passing: whether it holds only until the client may have the name.
     """
 
     name: str
     text: str
+    key: str = ""
     passing: bool = False
 
 

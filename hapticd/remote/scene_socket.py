@@ -167,10 +167,12 @@ class SceneSocket:
             if port.take(fields, self._sender(port, identity, descriptor, frames[0]), len(self._axes), now_ns):
                 self._write(port)
             self._refusals.taken(identity, port.limits.name)
-        except (NotTakenError, WrongMessageError) as error:
+        except NotTakenError as error:
             port.refused += 1
-            passing = isinstance(error, NotTakenError)
-            self._refusals.add(identity, Refusal(port.limits.name, str(error), passing), now_ns)
+            self._refusals.add(identity, Refusal(port.limits.name, str(error), passing=True), now_ns)
+        except WrongMessageError as error:
+            port.refused += 1
+            self._refusals.add(identity, Refusal(port.limits.name, str(error), error.key), now_ns)
 
     def _sender(self, port: LeasedPort, identity: bytes, descriptor: int, frame: zmq.Frame) -> Sender:
         """Who sent a message; looked up only where it is not the owner of its port, whom we know.
@@ -194,7 +196,7 @@ class SceneSocket:
         self._writer.write(self._slots[port.limits.name], port.update)
 
     def _refuse(self, identity: bytes, refusal: Refusal) -> None:
-        self._send(identity, {"ok": False, "name": refusal.name, "text": refusal.text})
+        self._send(identity, {"ok": False, "name": refusal.name, "text": refusal.text, "key": refusal.key})
 
     def _send(self, identity: bytes, answer: Mapping[str, Any]) -> None:
         with contextlib.suppress(zmq.ZMQError):  # who is answered has gone

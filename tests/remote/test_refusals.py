@@ -17,7 +17,7 @@ class Told:
         self.refusals = Refusals(lambda who, refusal: self.said.append((who, refusal.text)))
 
     def refuse(self, who: bytes, text: str, at_s: float, *, passing: bool = False) -> None:
-        self.refusals.add(who, Refusal("tool", text, passing), round(at_s * QUIET_NS))
+        self.refusals.add(who, Refusal("tool", text, passing=passing), round(at_s * QUIET_NS))
 
     def pass_time(self, to_s: float) -> None:
         self.refusals.turn(round(to_s * QUIET_NS))

@@ -1,0 +1,43 @@
+"""Random clients of the study in real time: what the daemon did is what the tick does, within limits, and it rests.
+
+A busy computer makes a client later than its network is. So what has not come to rest is run again offline with every
+message as late as it was: only where something would have held it then, and the study's own run of it rests, the daemon
+has failed.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from hapticd.offline.outcome import Outcome
+from hapticd_studies.law_spec import parse_laws
+from hapticd_studies.remote.runs import draw, run
+from tests.daemon.running import Daemon
+from tests.remote.live_client import DAMPERS, MOST_N, again, drive, pressed, under
+
+SEED = 4
+CLIENTS = 50
+DAILY = {("tool", 1), ("force", 11)}
+"""Both lose messages, in rows too, and pause."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "index"),
+    [
+        pytest.param(kind, index, marks=[] if (kind, index) in DAILY else [pytest.mark.nightly])
+        for index in range(CLIENTS // 2)
+        for kind in ("tool", "force")
+    ],
+)
+def test_a_random_client_is_held_within_limits_without_a_step_and_comes_to_rest(kind: str, index: int) -> None:
+    case, config = pressed(SEED, index, kind, at_s=1.0)
+    with Daemon(config.text).wait_ready() as daemon:
+        session = drive(daemon, case, config, ticks=4000 if (kind, index) in DAILY else 5500)
+    assert len(session.ticks) > 0.5 * (session.ticks[-1].seq - session.ticks[0].seq)
+    assert max(abs(tick.device_n) for tick in session.ticks) <= MOST_N * (1.0 + 1e-9)
+    assert session.unramped() == []
+    positions_m = again(session)
+    assert all(tick.x_m == positions_m[tick.seq] for tick in session.ticks), "to the last bit"
+    if session.outcome is not Outcome.SETTLED and Outcome.SETTLED in under(session, DAMPERS):
+        studied = run(draw(SEED, index, kind), parse_laws(config.config.remote.law, {})[0])
+        assert studied[0] != Outcome.SETTLED
