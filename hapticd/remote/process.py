@@ -1,8 +1,8 @@
 """The remote process: what runs behind `python -m hapticd.remote.process`.
 
-It hears the clients of the scene and streams them each tick, off the loop's processor where there is another, and there
-at the lowest real-time priority, so that no ordinary program comes between a tick and those who wait for it; while it is
-flooded it is an ordinary one. The supervisor starts it with one end of a socket pair as its descriptor `--socket`:
+It hears the clients of the scene and streams them each tick, off the loop's processor where there is another. There it
+has the lowest real-time priority, so that no ordinary program comes between a tick and those who wait for it; while it
+is flooded it is an ordinary one. The supervisor starts it with one end of a socket pair as its descriptor `--socket`:
 settings come in over that, the loop's memory with them, and a sign of life with what was counted goes out each second.
 
 One thread. It sleeps until the next tick ought to be done and then looks, in naps of a few microseconds, whether it is,

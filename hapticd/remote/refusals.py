@@ -1,7 +1,7 @@
 """What clients are told of what was refused: the first at once, and then the last of each second.
 
-A refusal that falls into the second after another one is told at its end, so that a client that has said one thing wrong
-hears of it, however much it has said wrong before.
+A refusal that falls into the second after another one is told at its end, so that a client hears of what it has said
+wrong, however much it has said wrong before.
 """
 
 from __future__ import annotations

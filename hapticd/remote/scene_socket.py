@@ -1,7 +1,8 @@
 """What clients say of the scene: a ROUTER, with a lease a name and a bound on everything.
 
 A message is one msgpack map. What is refused is counted and answered, once a second a client at most, and nothing that
-arrives can raise. A client whose connection has ended has no lease: the next one may be the same program, started again.
+arrives can raise. A client whose connection has ended has no lease: the next one may be the same program, started
+again.
 """
 
 from __future__ import annotations

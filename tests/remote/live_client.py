@@ -55,7 +55,7 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A step of the client: after which tick, on what it saw of which, how long after what it saw before, what it said."""
+    """A step: after which tick, on what it saw of which and how long after what it saw before, and what it said."""
 
     after: int
     saw: int

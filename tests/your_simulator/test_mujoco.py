@@ -53,14 +53,18 @@ def test_the_hand_feels_the_scene_and_the_scene_the_hand() -> None:
     assert np.abs(session.force_n).max() > 4.0
 
 
-def test_the_example_runs_beside_a_daemon() -> None:
+@pytest.mark.parametrize(
+    ("rate_hz", "duration_s"),
+    [(60, 4), *(pytest.param(rate_hz, LONG_S, marks=pytest.mark.nightly) for rate_hz in RATES_HZ)],
+)
+def test_the_example_runs_beside_a_daemon(rate_hz: int, duration_s: float) -> None:
     with (
         Daemon((EXAMPLE / "scene.toml").read_text()).wait_ready() as daemon,
         Client(daemon.endpoint, topics=[Position]) as client,
     ):
         environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
         done = subprocess.run(
-            [sys.executable, EXAMPLE / "coupled.py", "60", "4"],
+            [sys.executable, EXAMPLE / "coupled.py", str(rate_hz), str(duration_s)],
             env=environment, capture_output=True, text=True, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr

@@ -45,7 +45,7 @@ def main(rate_hz=60.0, duration_s=8.0):
             due_s += 1.0 / rate_hz
             time.sleep(max(0.0, due_s - time.monotonic()))
     ball, drawer = scene.data.body("ball").xpos, scene.data.joint("drawer").qpos[0]
-    print(f"ball at x = {1e3 * ball[0]:.0f} mm, drawer {1e3 * drawer:.0f} mm in")
+    print(f"ball at x = {1e3 * ball[0]:.0f} mm, drawer {abs(1e3 * drawer):.0f} mm in")
 
 
 if __name__ == "__main__":
