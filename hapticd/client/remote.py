@@ -33,6 +33,7 @@ LONGEST_MEAN_S = 0.5
 
 _LAST_WORDS_MS = 200
 _LARGEST_MESSAGE = 1 << 16
+_SCALARS = ("stiffness_n_per_m", "damping_n_s_per_m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +188,7 @@ class RemotePort:
 
         Raises:
             RefusedError: the daemon has refused something sent before.
+            ValueError: what is to be numbers is not.
         """
         self._say(
             position_m=position_m,
@@ -203,6 +205,7 @@ class RemotePort:
 
         Raises:
             RefusedError: the daemon has refused something sent before.
+            ValueError: what is to be numbers is not.
         """
         self._say(force_n=force_n)
 
@@ -215,6 +218,7 @@ class RemotePort:
 
         Raises:
             RefusedError: the daemon has refused something sent before.
+            ValueError: what is to be numbers is not.
         """
         said = {"stiffness_n_per_m": stiffness_n_per_m, "damping_n_s_per_m": damping_n_s_per_m}
         self._say(**{**self._said, **{key: value for key, value in said.items() if value is not None}})
@@ -286,14 +290,14 @@ class RemotePort:
 
     def _say(self, **values: Any) -> None:
         self._look()
-        self._said.update((key, value) for key, value in values.items() if value is not None)
+        self._said.update((key, _numbers(key, value)) for key, value in values.items() if value is not None)
         for key in [key for key, value in values.items() if value is None]:
             self._said.pop(key, None)
         self.seq += 1
         message = {"name": self.name, "seq": self.seq, "sent_ns": time.monotonic_ns(), **self._said}
         if self._newest is not None:
             message["state_seq"] = self._newest.seq
-        self._sending.send(msgpack.packb(message, default=list), zmq.NOBLOCK)
+        self._sending.send(msgpack.packb(message), zmq.NOBLOCK)
 
     def _look(self) -> None:
         """See whether the daemon has refused something."""
@@ -305,7 +309,25 @@ class RemotePort:
 
     def _take(self) -> RemoteState:
         fields = msgpack.unpackb(self._hearing.recv(), use_list=False)
-        ports = {name: DrivenState(**port) for name, port in fields.pop("ports").items()}
-        known = {key: value for key, value in fields.items() if key in RemoteState.__dataclass_fields__}
-        self._newest = RemoteState(**{"orientation": (), **known, "port": ports.get(self.name), "ports": ports})
+        ports = {name: DrivenState(**_known(DrivenState, port)) for name, port in fields.pop("ports").items()}
+        known = {"orientation": (), **_known(RemoteState, fields), "port": ports.get(self.name), "ports": ports}
+        self._newest = RemoteState(**known)
         return self._newest
+
+
+def _numbers(key: str, value: Any) -> list[float] | float:
+    """A vector or a number of any kind, as of numpy or torch, in those that a message is made of.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    wanted = "a number" if key in _SCALARS else "a list of numbers"
+    try:
+        return float(value) if key in _SCALARS else [float(each) for each in value]
+    except (TypeError, ValueError):
+        raise ValueError(f"{key} = {value!r}: must be {wanted}") from None
+
+
+def _known(kind: type[Any], fields: dict[str, Any]) -> dict[str, Any]:
+    """What this client knows of what it is told; a newer daemon may tell more."""
+    return {key: value for key, value in fields.items() if key in kind.__dataclass_fields__}

@@ -94,12 +94,13 @@ def examine(fields: Mapping[str, Any], port: PortLimits, axes: int) -> Said:
     for key, value in fields.items():
         if key in _SAID_OF:
             continue
-        if key not in known:
-            raise WrongMessageError(f"{port.name} is a {port.kind} and has no {key[:40]}: it takes {', '.join(known)}")
         try:
+            if key not in known:
+                text = f"{port.name} is a {port.kind} and has no {key[:40]}: it takes {', '.join(known)}"
+                raise WrongMessageError(text)
             values[key] = _value(key, value, port, axes)
         except WrongMessageError as error:
-            error.key = key
+            error.key = key[:40]
             raise
         bits |= known[key]
     return Said(seq, sent_ns, state_seq, values, bits)

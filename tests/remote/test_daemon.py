@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import msgpack
+import numpy as np
 import pytest
 import zmq
 
@@ -73,6 +74,9 @@ def test_a_target_is_followed_and_the_client_learns_from_which_tick_on(tool: Rem
     tool.change(stiffness_n_per_m=1e9)
     with pytest.raises(RefusedError, match="must be 0 to 300"):
         hold(tool, 0.01)
+    with pytest.raises(ValueError, match=r"position_m = 0\.01: must be a list of numbers"):
+        tool.move(0.01)  # type: ignore[arg-type]
+    tool.move(np.array([0.01], np.float32))  # type: ignore[arg-type]  # as simulators have it
     tool.change(stiffness_n_per_m=100.0)
     sent = tool.seq
     wait_until(lambda: (port := tool.state().port) is not None and port.seq >= sent, "the change to be in force")
