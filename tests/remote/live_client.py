@@ -33,6 +33,8 @@ PORT = "client"
 PERIOD_S = 1e-3
 MOST_N = 12.0
 DAMPERS = "damper:damping_n_s_per_m=50,damper:damping_n_s_per_m=100"
+STILL_M = 1e-4
+"""Twice what the study calls still: here positions are the sensor's, and the client sees now one tick more, now less."""
 PAUSE_AFTER_S = 0.7
 """After the hand presses the client stands still, where it does."""
 
@@ -118,7 +120,7 @@ class Session:
 
     def judged(self, x_m: list[float]) -> Outcome:
         """What became of a press whose positions these are, to the end."""
-        criterion = Criterion()
+        criterion = Criterion(still_m=STILL_M)
         ended = x_m[-round(criterion.window_s / PERIOD_S) :]
         balance: Balance = self.case.balance()
         options = simulation_options(self.config)
