@@ -1,13 +1,14 @@
 """How soon what a client sends is felt, and how soon a client hears of a tick, beside a bare ZeroMQ echo.
 
-    hapticd bench remote [--messages 2000] [--json]
+    hapticd bench remote [--messages 2000] [--realtime] [--json]
 
-The client and the echo are the same kind of program as any client: Python, pyzmq, normal priority. Each message to the
-daemon is followed by one to the echo, both at any time within a period.
+The client and the echo are the same kind of program as any client: Python, pyzmq, normal priority, or the lowest
+real-time one. Each message to the daemon is followed by one to the echo, both at any time within a period.
 """
 
 from __future__ import annotations
 
+import os
 import random
 import subprocess
 import sys
@@ -81,15 +82,16 @@ class RemoteReport:
     conditions: Conditions
 
 
-def measure(messages: int, progress: Progress) -> RemoteReport:
+def measure(messages: int, progress: Progress, realtime: bool = False) -> RemoteReport:
     """Send `messages` messages to a daemon, and as many to an echo.
 
     Args:
         messages: how many.
         progress: told what is done.
+        realtime: client and echo have the lowest real-time priority, so that no ordinary program is in any way.
 
     Raises:
-        HapticdError: the daemon could not start, or did not survive.
+        HapticdError: the daemon could not start, or did not survive; or there is no permission for that priority.
     """
     watch = MachineWatch()
     with tempfile.TemporaryDirectory(prefix="hapticd-") as place:
@@ -98,6 +100,7 @@ def measure(messages: int, progress: Progress) -> RemoteReport:
         config.write_text(CONFIG)
         with (
             running_daemon(config, directory) as daemon,
+            _priority(realtime),
             _echo(directory) as echo,
             Client(daemon.endpoint, topics=[Timing], receive_high_water=0) as timing,
             _Driver(directory / "default") as driver,
@@ -106,7 +109,7 @@ def measure(messages: int, progress: Progress) -> RemoteReport:
                 times = _measured(driver, echo, timing, messages, progress)
             except TimeoutError as error:
                 raise daemon.failed(str(error)) from error
-    return _report(*times, watch.end())
+    return _report(*times, watch.end(), realtime)
 
 
 def _measured(
@@ -135,7 +138,7 @@ def _measured(
 
 
 def _report(
-    echo_us: list[float], to_tick_us: list[float], to_client_us: list[float], machine: Conditions
+    echo_us: list[float], to_tick_us: list[float], to_client_us: list[float], machine: Conditions, realtime: bool
 ) -> RemoteReport:
     echo, to_tick, to_client = (Quantiles.of(each) for each in (echo_us, to_tick_us, to_client_us))
     bars = [
@@ -146,7 +149,7 @@ def _report(
             _bar(f"tick to client, {name} [us]", getattr(to_client, name), MOST_TIMES * getattr(echo, name)),
         )
     ]
-    if machine.others > MOST_OTHERS:
+    if machine.others > MOST_OTHERS and not realtime:
         note = f"other programs kept {machine.others:.2f} processors busy"
         bars = [replace(bar, verdict="INCONCLUSIVE", note=note) for bar in bars]
     return RemoteReport(echo, to_tick, to_client, tuple(doubtful(bars, machine)), machine)
@@ -207,6 +210,22 @@ class _Driver:
                 return sent_ns, state["seq"], heard
             if now_ns > end_ns:
                 raise TimeoutError(f"a message was not in force after {PATIENCE_S:g} s")
+
+
+@contextmanager
+def _priority(realtime: bool) -> Iterator[None]:
+    """Be a real-time program, and with it all that begins within, where that is wanted."""
+    if not realtime:
+        yield
+        return
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError as error:
+        raise HapticdError("--realtime: not permitted here: grant CAP_SYS_NICE or an rtprio limit of 1") from error
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -29,5 +30,12 @@ def test_it_reports_every_way_beside_the_echo(capsys: pytest.CaptureFixture[str]
 
 
 def test_what_takes_longer_than_is_asked_fails() -> None:
-    report = remote._report([100.0] * 100, [1301.0] * 100, [299.0] * 99 + [301.0], QUIET)
+    report = remote._report([100.0] * 100, [1301.0] * 100, [299.0] * 99 + [301.0], QUIET, False)
     assert [bar.verdict for bar in report.bars] == ["FAIL", "PASS", "FAIL", "PASS"]
+
+
+def test_beside_other_programs_only_those_are_judged_that_they_do_not_disturb() -> None:
+    busy = replace(QUIET, others=1.5)
+    for realtime, verdict in ((False, "INCONCLUSIVE"), (True, "PASS")):
+        report = remote._report([100.0] * 100, [1200.0] * 100, [200.0] * 100, busy, realtime)
+        assert {bar.verdict for bar in report.bars} == {verdict}

@@ -34,7 +34,7 @@ PERIOD_S = 1e-3
 MOST_N = 12.0
 DAMPERS = "damper:damping_n_s_per_m=50,damper:damping_n_s_per_m=100"
 STILL_M = 1e-4
-"""Twice what the study calls still: here positions are the sensor's, and the client sees now one tick more, now less."""
+"""Twice what the study calls still: positions are the sensor's, and a client sees now one tick more, now less [m]."""
 PAUSE_AFTER_S = 0.7
 """After the hand presses the client stands still, where it does."""
 

@@ -13,6 +13,10 @@ from hapticd_bench.commands.tables import make_console, measuring, print_verdict
 
 def remote(
     messages: Annotated[int, typer.Option(min=10, max=1_000_000, help="How many are sent.")] = 1000,
+    realtime: Annotated[
+        bool,
+        typer.Option("--realtime", help="Client and echo at the lowest real-time priority: beside ordinary programs."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Measure how soon a client's message is felt and a tick is heard of, next to a bare ZeroMQ echo.
@@ -25,7 +29,7 @@ def remote(
     from hapticd_bench.remote import STEP_S, measure
 
     with measuring(messages * STEP_S) as progress:
-        report = measure(messages, progress)
+        report = measure(messages, progress, realtime)
     if as_json:
         typer.echo(json.dumps(asdict(report), indent=2))
         return
