@@ -31,6 +31,7 @@ SMALL_LEAKS = 4.0  # damping at most this many times what was generated in a sma
 MEMORY = 0.998  # share of the felt mass's evidence that a new sample leaves standing
 SHARE_OF_MASS = 0.6  # most damping in m/dt: a sampled damper is itself unstable from 2
 LATE_SHARE_OF_MASS = 0.35  # the same where the device applies forces one sample late: from 0.83
+MOST = 200.0  # most damping whatever was felt: a hand that moves is easily taken for a mass [N s/m]
 NEW_SPEED = 0.5  # share of the newest sample in the velocity that is damped
 
 
@@ -160,7 +161,7 @@ def _bound(state: Any, params: Any, tick: Any) -> None:
     if state.felt_mass_kg > 0.0:
         share = LATE_SHARE_OF_MASS if state.forces_late else SHARE_OF_MASS
         most = share * state.felt_mass_kg / state.period_s
-    state.damping_n_s_per_m = min(state.damping_n_s_per_m, most)
+    state.damping_n_s_per_m = min(state.damping_n_s_per_m, most, MOST)
     if tick.in_contact and tick.spring_n != 0.0:
         base = min(params.most_base_n_s_per_m, params.base_s * _bounded(tick.spring_n / -tick.x_m))
         state.damping_n_s_per_m = max(state.damping_n_s_per_m, base)

@@ -127,6 +127,14 @@ def test_one_count_of_the_position_kicks_by_half_of_what_it_would() -> None:
     assert port.go(1e-5, 0.0, 2000.0) == pytest.approx(-0.5 * 30.0 * 1e-2)
 
 
+def test_there_is_an_end_to_damping_whatever_mass_is_felt() -> None:
+    port = Port()
+    port.go(0.0, 0.0)
+    port.state.felt_mass_kg = 50.0
+    port.swing(60.0, times=5)
+    assert port.damping <= 200.0
+
+
 @pytest.mark.parametrize("late", [10, 40, 80])
 def test_a_spring_that_comes_late_is_held(late: int) -> None:
     """Without a law it swings by centimetres from (5 N s/m) / delay on; here it has four times that."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -181,7 +182,18 @@ def test_one_client_again_says_what_it_is_and_what_becomes_of_it(capsys: pytest.
     assert "damper:100" in said
 
 
-@pytest.mark.parametrize("arguments", [("--clients", "0"), ("--replay", "wall:1:2"), ("--laws", "no-such")])
+@pytest.mark.parametrize("hand", ["stroke", "tap"])
+def test_a_hand_that_moves_feels_a_damper_as_drag_and_comes_to_rest(hand: str) -> None:
+    case = replace(draw(7, 0, "tool", hand), network=Network(500.0), stiffness_n_per_m=500.0)
+    dragged = became(case, "damper:damping_n_s_per_m=20")
+    assert dragged["drag_n_s_per_m"] == pytest.approx(20.0)
+    assert dragged["outcome"] == Outcome.SETTLED
+    assert became(case, "none")["drag_n_s_per_m"] == 0.0
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--clients", "0"), ("--hand", "slap"), ("--replay", "wall:1:2"), ("--laws", "no-such")]
+)
 def test_what_makes_no_sense_is_one_line(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     assert remote(*arguments) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1

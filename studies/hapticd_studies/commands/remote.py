@@ -19,6 +19,7 @@ _QUICK_CLIENTS = 4
 def command(
     clients: Annotated[int, typer.Option(help="How many random clients of each kind.")] = 500,
     seed: Annotated[int, typer.Option(help="Of the clients; the same seed gives the same ones anywhere.")] = 1,
+    hand: Annotated[str, typer.Option(help="What the hand does to random clients: press, stroke or tap.")] = "press",
     laws: Annotated[str, typer.Option(help="Laws to compare, as none,energy-cycle:window=1.")] = "",
     quick: Annotated[
         bool, typer.Option("--quick", help="A few clients and no ladder: about 20 s on one core.")
@@ -46,14 +47,17 @@ def command(
         raise ConfigError(f"--seed {seed}: must be 0 or more and less than 1e18")
 
     from hapticd_studies.law_spec import parse_laws
+    from hapticd_studies.remote.runs import HANDS
     from hapticd_studies.remote.sweep import DAMPERS, LAWS, RemotePlan
 
+    if hand not in HANDS:
+        raise ConfigError(f"--hand {hand}: must be one of {', '.join(HANDS)}")
     chosen, dampers = parse_laws(laws or LAWS, {}), parse_laws(",".join(DAMPERS), {})
     console = Console(highlight=False)
     if replay is not None:
         from hapticd_studies.remote.replay import case_of, figures
 
-        case = case_of(replay)
+        case = case_of(replay, hand)
         for line in case.words():
             console.print(line, markup=False)
         console.print(figures(case, [*chosen, *dampers]))
@@ -64,7 +68,7 @@ def command(
     from hapticd_studies.remote.report import LADDER_WORDS, RANDOM_WORDS, report
 
     require_folder(output, _FILES)
-    plan = RemotePlan(seed, min(clients, _QUICK_CLIENTS) if quick else clients, chosen, dampers, ladder=not quick)
+    plan = RemotePlan(seed, min(clients, _QUICK_CLIENTS) if quick else clients, chosen, dampers, not quick, hand)
     Console(stderr=True, highlight=False).print(f"{len(plan.cells)} runs", soft_wrap=True)
     job = plan.job()
     with kept(job, output / "remote.journal", fresh) as journal:

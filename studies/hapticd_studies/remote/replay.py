@@ -15,8 +15,8 @@ from hapticd_studies.remote.runs import COLUMNS, Case, draw, run
 from hapticd_studies.remote.sweep import KINDS
 
 
-def case_of(text: str) -> Case:
-    """The client of `KIND:SEED:INDEX`.
+def case_of(text: str, hand: str = "press") -> Case:
+    """The client of `KIND:SEED:INDEX`, under a hand.
 
     Raises:
         ConfigError: it is none.
@@ -24,15 +24,15 @@ def case_of(text: str) -> Case:
     found = re.fullmatch(rf"({'|'.join(KINDS)}):(\d{{1,18}}):(\d{{1,9}})", text)
     if found is None:
         raise ConfigError(f"--replay {text}: must be KIND:SEED:INDEX, as tool:1:57")
-    return draw(int(found[2]), int(found[3]), found[1])
+    return draw(int(found[2]), int(found[3]), found[1], hand)
 
 
 def figures(case: Case, laws: Sequence[LawSpec]) -> Table:
     """What becomes of it under each law."""
     shown = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    shown.add_column("")
+    shown.add_column("", no_wrap=True)
     for name in COLUMNS:
-        shown.add_column(name, justify="right")
+        shown.add_column(name, justify="right", overflow="fold")
     for law in laws:
         row = dict(zip(COLUMNS, run(case, law), strict=True))
         numbers = [f"{row[name]:.4g}" for name in COLUMNS[1:]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
+from statistics import median
 
 from rich.markup import escape
 from rich.table import Table
@@ -25,7 +26,8 @@ LADDER_WORDS = (
 RANDOM_WORDS = (
     "holdable: random clients that some law or constant damper keeps still and in place; of them: steady, wherever; "
     "held, in place too; unfelt, with a felt index of at most 1; of all: the largest force, and its largest step from "
-    "one tick to the next"
+    "one tick to the next; drag: what the law took of the device's motion from second 2 to 4, as a damping; leak: the "
+    "same of what the client gave; both the median of all"
 )
 """What the heads of the tables mean."""
 
@@ -44,6 +46,7 @@ class Shares:
         unfelt: how many of those are held with a felt index of at most 1.
         largest_force_n: of all of the kind [N].
         largest_step_n: of force, from one tick to the next, of all of the kind [N].
+        drag_n_s_per_m, leak_n_s_per_m: what the law took and the client gave, as a damping; the median [N s/m].
     """
 
     kind: str
@@ -54,6 +57,8 @@ class Shares:
     unfelt: int
     largest_force_n: float
     largest_step_n: float
+    drag_n_s_per_m: float
+    leak_n_s_per_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,11 +109,12 @@ class RemoteReport:
 
     def random(self) -> Table:
         """For the terminal: the random clients."""
-        shown = _table("law", "holdable", "steady", "held", "unfelt", "force [N]", "step [N]")
+        shown = _table("law", "holdable", "steady", "held", "unfelt", "force [N]", "step [N]", "drag", "leak")
         for one in self.shares:
             label = escape(one.law.replace("damping_n_s_per_m=", ""))
             counts = (one.holdable, one.steady, one.held, one.unfelt)
-            shown.add_row(one.kind, label, *map(str, counts), f"{one.largest_force_n:.3g}", f"{one.largest_step_n:.3g}")
+            values = (one.largest_force_n, one.largest_step_n, one.drag_n_s_per_m, one.leak_n_s_per_m)
+            shown.add_row(one.kind, label, *map(str, counts), *(f"{value:.3g}" for value in values))
         return shown
 
     def json(self) -> bytes:
@@ -119,6 +125,7 @@ class RemoteReport:
                 "hapticd": __version__,
                 "seed": self.plan.seed,
                 "clients_of_each_kind": self.plan.count,
+                "hand": self.plan.hand,
                 "criterion": Criterion().declared(),
                 "ladder": [asdict(one) for one in self.reaches],
                 "random": [asdict(one) for one in self.shares],
@@ -187,6 +194,8 @@ def _shares(plan: RemotePlan, rows: Sequence[Row]) -> list[Shares]:
                     sum(held(row) and row["felt"] <= 1.0 for row in of_law),
                     max((found[law.label]["peak_force_n"] for found in mine), default=0.0),
                     max((found[law.label]["largest_step_n"] for found in mine), default=0.0),
+                    median(found[law.label]["drag_n_s_per_m"] for found in mine),
+                    median(found[law.label]["leak_n_s_per_m"] for found in mine),
                 )
             )
     return shares

@@ -23,14 +23,31 @@ from hapticd_studies.remote.network import Network, turns
 
 DURATION_S = 4.0
 MAX_FORCE_N = 12.0
+REST_S = 2.0
+"""How long a hand that has moved presses in the end."""
 
-COLUMNS = ("outcome", "span_m", "mean_m", "felt", "peak_force_n", "largest_step_n")
-"""Of a run, in the order of its row; `largest_step_n`: of the applied force from one tick to the next."""
+HANDS = ("press", "stroke", "tap")
+
+COLUMNS = (
+    "outcome",
+    "span_m",
+    "mean_m",
+    "felt",
+    "peak_force_n",
+    "largest_step_n",
+    "drag_n_s_per_m",
+    "leak_n_s_per_m",
+)
+"""Of a run, in the order of its row.
+
+`largest_step_n`: of the applied force from one tick to the next; `drag_n_s_per_m`: what the law took from second 2 to
+4, as a damping of the device's motion; `leak_n_s_per_m`: the same of what the client gave.
+"""
 
 _CONFIG = """
 [device.options]
 model = "omega7"
-hand.force = {{ profile = "constant", newton = {press_n!r} }}
+hand.force = {hand}
 hand.mass_kg = {hand_kg!r}
 hand.damping_n_s_per_m = {hand_n_s_per_m!r}
 hand.stiffness_n_per_m = {hand_n_per_m!r}
@@ -58,6 +75,7 @@ class Case:
         table_n_per_m: stiffness of what that lies on [N/m].
         hand_kg, hand_n_s_per_m, hand_n_per_m: what of the hand moves with the device.
         seed: of everything random.
+        hand: `press`: it presses and stays; `stroke`, `tap`: first it goes to and fro for 4 s, past the surface.
     """
 
     name: str
@@ -71,6 +89,12 @@ class Case:
     hand_n_s_per_m: float = 1.0
     hand_n_per_m: float = 100.0
     seed: int = 1
+    hand: str = "press"
+
+    @property
+    def duration_s(self) -> float:
+        """Of its run [s]."""
+        return DURATION_S if self.hand == "press" else DURATION_S + REST_S
 
     def client(self) -> Client:
         """The program itself, from its beginning."""
@@ -83,7 +107,7 @@ class Case:
         coupling = f"stiffness_n_per_m = {self.stiffness_n_per_m!r}\ndamping_n_s_per_m = 2.0\nhold_s = 0.25"
         loaded = _parsed(
             _CONFIG.format(
-                press_n=-self.press_n,
+                hand=self._force(),
                 hand_kg=self.hand_kg,
                 hand_n_s_per_m=self.hand_n_s_per_m,
                 hand_n_per_m=self.hand_n_per_m,
@@ -98,6 +122,22 @@ class Case:
         found = asdict(self)
         found |= found.pop("network")
         return [f"{name} = {value}" for name, value in found.items()]
+
+    def _force(self) -> str:
+        """What the hand does, as a profile of the simulated device."""
+        press_n = self.press_n
+        if self.hand == "press":
+            return f'{{ profile = "constant", newton = {-press_n!r} }}'
+        pulse = 2.0 * math.pi * random.Random(self.seed).uniform(0.5, 2.0)
+        points = []
+        for at in range(round(DURATION_S / 0.005)):
+            time_s = 0.005 * at
+            if self.hand == "stroke":
+                points.append([time_s, press_n * (1.6 * math.sin(pulse * time_s) - 1.0)])
+            else:
+                points.append([time_s, press_n * (0.65 * math.cos(pulse * time_s) - 0.35)])
+        points.append([DURATION_S + 0.1, -press_n])
+        return f'{{ profile = "recorded", points = {points} }}'
 
     def balance(self) -> Balance:
         """Where the hand's force and all springs balance."""
@@ -115,18 +155,19 @@ def run(case: Case, law: LawSpec, take: Callable[[Rehearsal], object] | None = N
     """
     rehearsal = Rehearsal(case.config(law))
     period_s = rehearsal.period_s
-    ticks = round(DURATION_S / period_s)
-    port = rehearsal.tick.ports[0]
+    ticks = round(case.duration_s / period_s)
+    port = rehearsal.tick.couplings[0]
     client = case.client()
     update = Update()
     inbox: deque[tuple[float, int, Update]] = deque()
-    coming = turns(case.network, DURATION_S, case.seed)
+    coming = turns(case.network, case.duration_s, case.seed)
     turn = next(coming, None)
     before_s = -1.0 / case.network.rate_hz
     newest = -1
     known: list[Seen] = []
     true_m: list[float] = []
     peak_n = step_n = last_n = 0.0
+    drag_j = given_j = motion = damping = own_n = last_m = 0.0
     for count in rehearsal.run(ticks):
         now_s = (count + 1) * period_s
         known.append(Seen(rehearsal.tick.motion.position_m[0], port.impulse_n_s[0]))
@@ -149,14 +190,22 @@ def run(case: Case, law: LawSpec, take: Callable[[Rehearsal], object] | None = N
         peak_n = max(peak_n, abs(force_n))
         step_n = max(step_n, abs(force_n - last_n))
         last_n = force_n
-        true_m.append(rehearsal.model.x_m)
+        x_m = rehearsal.model.x_m
+        true_m.append(x_m)
+        if 0.5 * DURATION_S <= now_s < DURATION_S:
+            moved_m = x_m - last_m
+            drag_j += damping * moved_m * moved_m / period_s
+            given_j += own_n * moved_m
+            motion += moved_m * moved_m / period_s
+        last_m, damping, own_n = x_m, port.channels[0].damping_n_s_per_m, port.channels[0].own_n
         if take is not None:
             take(rehearsal)
-    return [*_ended(case, rehearsal, np.array(true_m)), peak_n, step_n]
+    over = max(motion, 1e-12)
+    return [*_ended(case, rehearsal, np.array(true_m)), peak_n, step_n, drag_j / over, max(0.0, given_j) / over]
 
 
-def draw(seed: int, index: int, kind: str) -> Case:
-    """One of the random clients."""
+def draw(seed: int, index: int, kind: str, hand: str = "press") -> Case:
+    """One of the random clients, and what the hand does."""
     random_ = random.Random(f"{seed}:{index}:{kind}")
 
     def between(low: float, high: float) -> float:
@@ -184,6 +233,7 @@ def draw(seed: int, index: int, kind: str) -> Case:
         hand_n_s_per_m=random_.uniform(0.3, 1.5),
         hand_n_per_m=random_.uniform(40.0, 200.0),
         seed=random_.randrange(1 << 30),
+        hand=hand,
     )
 
 

@@ -37,6 +37,7 @@ class RemotePlan:
         laws: those that are compared.
         dampers: the constant ones that they are held against.
         ladder: whether the ladder is climbed.
+        hand: what the hand does to the random clients.
     """
 
     seed: int
@@ -44,6 +45,7 @@ class RemotePlan:
     laws: Sequence[LawSpec]
     dampers: Sequence[LawSpec]
     ladder: bool
+    hand: str = "press"
 
     @property
     def all_laws(self) -> list[LawSpec]:
@@ -53,7 +55,7 @@ class RemotePlan:
     @property
     def random(self) -> list[Case]:
         """The random clients, kind by kind."""
-        return [draw(self.seed, index, kind) for kind in KINDS for index in range(self.count)]
+        return [draw(self.seed, index, kind, self.hand) for kind in KINDS for index in range(self.count)]
 
     @property
     def rungs(self) -> list[tuple[Case, LawSpec]]:
@@ -76,6 +78,7 @@ class RemotePlan:
             "laws": [_plain(law) for law in self.laws],
             "dampers": [_plain(law) for law in self.dampers],
             "ladder": self.ladder,
+            "hand": self.hand,
         }
         names = tuple(sorted({law.name for law in self.all_laws}))
         return Job(_block, spec, block_sizes(len(self.cells), _MOST_CELLS), names, interpreted=True)
@@ -101,5 +104,5 @@ def _plain(law: LawSpec) -> dict[str, Any]:
 
 def _block(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
     laws, dampers = ([LawSpec(**each) for each in spec[name]] for name in ("laws", "dampers"))
-    cells = RemotePlan(spec["seed"], spec["count"], laws, dampers, spec["ladder"]).cells
+    cells = RemotePlan(spec["seed"], spec["count"], laws, dampers, spec["ladder"], spec["hand"]).cells
     return [run(*cells[cell]) for cell in block_cells(block_sizes(len(cells), _MOST_CELLS), block)]
