@@ -13,7 +13,7 @@ from hapticd.tick.contact import RunningLaw
 from hapticd.tick.guard import Guard
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.coupling import Coupling
-from hapticd.tick.remote.one_port import PortSite
+from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.remote_object import RemoteContact
 from hapticd.tick.remote.streamed_force import StreamedForce
 from hapticd.tick.space.tick import SpaceTick

@@ -7,16 +7,16 @@ them hands its calls to the port, and the port asks the laws of all.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import sqrt
 
 from hapticd.config.remote import PortLimits
 from hapticd.law import LawSnapshot
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.guard import start_blend
-from hapticd.tick.motion import Motion
 from hapticd.tick.remote.books import PortBooks
+from hapticd.tick.remote.line import Line
 from hapticd.tick.remote.port import Port, PortState
+from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.ramped import Ramped
 from hapticd.tick.remote.update import Update
 from hapticd.tick.space.channel import LEAST_M, Channel
@@ -27,26 +27,7 @@ OUTSIDE_S = 0.5
 STRICTLY = 1.0 - 1e-15
 """So that no rounding puts a force above its limit."""
 
-_IDLE, _HELD = PortState.IDLE, PortState.HELD
-
-
-@dataclass(frozen=True, slots=True)
-class PortSite:
-    """Where couplings and forces are.
-
-    Attributes:
-        motion: where the device is.
-        make_law: a fresh law, one an axis.
-        resolution_m: smallest step of the device's position [m].
-        period_s: nominal time between ticks [s].
-        ramp_s: duration of ramps [s].
-    """
-
-    motion: Motion
-    make_law: Callable[[], RunningLaw]
-    resolution_m: float
-    period_s: float
-    ramp_s: float
+_HELD = PortState.HELD
 
 
 class OnePort(Port):
@@ -299,25 +280,6 @@ class OnePort(Port):
             channel.rest()
             channel.wake(False)
             self.force_n[axis] = 0.0
-
-
-class Line:
-    """What stands for the wall of an axis.
-
-    Attributes:
-        outward: 1.0; 0.0 while the port sleeps, so that the tick sees the device nowhere but at 0.
-        axis: of the device.
-        position_m: 0: the port knows where its target is [m].
-        spring_n: the spring's part of the last force [N].
-    """
-
-    __slots__ = ("axis", "outward", "position_m", "spring_n")
-
-    def __init__(self, axis: int) -> None:
-        self.axis = axis
-        self.outward = 0.0
-        self.position_m = 0.0
-        self.spring_n = 0.0
 
 
 class PortAxis(Channel):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import sqrt
 
 from hapticd.config.remote import PortLimits
-from hapticd.tick.remote.one_port import OnePort, PortSite
+from hapticd.tick.remote.one_port import OnePort
+from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.update import FORCE, RELEASED, Update
 from hapticd.tick.space.channel import LEAST_M
 
