@@ -96,20 +96,24 @@ class Damping:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """One tick: an object that was touched. A tick has one for each of them, and none where nothing is touched.
+    """One tick: an object that was touched, or a coupling or force that was in force. A tick has one for each of them.
 
     Attributes:
         timestamp: seconds since the epoch at the tick's deadline [s].
         seq: tick number.
-        object: index of the object; `Status.object_name` has its name.
+        force_n: force that it applied to the device, one element an axis [N].
+        object: index of the object; `Status.object_name` has its name. -1: a coupling or a force, which has of what
+            follows the last three only.
         proxy_m: the point on its surface that pulled the device back [m].
         normal: from the device to the surface, outward, a unit vector.
         depth_m: how far that was [m].
-        force_n: force that it applied to the device [N].
         sliding: whether friction slipped.
         carrier: of the objects that overlap and are one solid, the one that carried the force: `object` is the first of
             them. -1 from a daemon that does not tell.
         inside: those of them that the device was in.
+        remote: index of what a client drove; `Status.remote_name` has its name. -1: no client drives it.
+        remote_seq: the client's own number of the message that was in force; -1: none was.
+        target_m: where the followed target, or the origin of the object, was; of a force 0 [m].
         invalid: a value was not finite and stands here as 0.
     """
 
@@ -117,14 +121,17 @@ class Touch:
 
     timestamp: float
     seq: int
-    object: int
-    proxy_m: tuple[float, ...]
-    normal: tuple[float, ...]
-    depth_m: float
     force_n: tuple[float, ...]
-    sliding: bool
+    object: int = -1
+    proxy_m: tuple[float, ...] = ()
+    normal: tuple[float, ...] = ()
+    depth_m: float = 0.0
+    sliding: bool = False
     carrier: int = -1
     inside: tuple[int, ...] = ()
+    remote: int = -1
+    remote_seq: int = -1
+    target_m: tuple[float, ...] = ()
     invalid: bool = False
 
 

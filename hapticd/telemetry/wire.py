@@ -155,9 +155,14 @@ def pulling(ports: PortsRecord) -> list[PortRecord]:
     return sorted((one for one in ports.shown if one.index >= ports.objects), key=lambda one: one.index)
 
 
+def _acts(port: PortRecord) -> bool:
+    """Whether a coupling or a force is in force, or still fades out."""
+    return port.state == PortState.HELD or any(port.force_n)
+
+
 def _as_contact(port: PortRecord) -> WallRecord:
-    held = port.state == PortState.HELD or any(port.force_n)
-    return WallRecord(held, port.stiffness_n_per_m, port.damping_n_s_per_m, port.felt_mass_kg, 0, 0.0, 0.0, 0.0, 0.0)
+    acts = _acts(port)
+    return WallRecord(acts, port.stiffness_n_per_m, port.damping_n_s_per_m, port.felt_mass_kg, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 def damping_map(record: TickRecord, timestamp: float, contacts: Sequence[WallRecord] | None = None) -> Map:
@@ -182,27 +187,39 @@ def damping_map(record: TickRecord, timestamp: float, contacts: Sequence[WallRec
 
 
 def contact_maps(record: TickRecord, timestamp: float) -> list[Map]:
-    """hapticd/contact: a map for each object that is touched."""
-    if record.space is None:
-        return []
-    return [
-        plain_map(
-            {
-                "timestamp": timestamp,
-                "seq": record.seq,
-                "object": one.index,
-                "proxy_m": one.proxy_m,
-                "normal": one.normal,
-                "depth_m": one.depth_m,
-                "force_n": one.force_n,
-                "sliding": one.sliding,
-                "carrier": one.carrier,
-                "inside": one.inside,
-            }
-        )
-        for one in record.space.near
-        if one.contact.in_contact
-    ]
+    """hapticd/contact: a map for each object that is touched, then one for each coupling and force that acts."""
+    maps: list[Map] = []
+    said: dict[int, Map] = {}
+    if record.ports is not None:
+        said = {one.object: _said(one) for one in record.ports.shown if one.object >= 0}
+    if record.space is not None:
+        for one in record.space.near:
+            if one.contact.in_contact:
+                fields: Map = {
+                    "timestamp": timestamp,
+                    "seq": record.seq,
+                    "object": one.index,
+                    "proxy_m": one.proxy_m,
+                    "normal": one.normal,
+                    "depth_m": one.depth_m,
+                    "force_n": one.force_n,
+                    "sliding": one.sliding,
+                    "carrier": one.carrier,
+                    "inside": one.inside,
+                }
+                maps.append(plain_map({**fields, **said.get(one.index, {})}))
+    if record.ports is not None:
+        for port in pulling(record.ports):
+            if _acts(port):
+                maps.append(
+                    plain_map({"timestamp": timestamp, "seq": record.seq, "force_n": port.force_n, **_said(port)})
+                )
+    return maps
+
+
+def _said(port: PortRecord) -> Map:
+    """What a map has of what a client drives."""
+    return {"remote": port.index, "remote_seq": port.seq, "target_m": port.target_m}
 
 
 def timing_map(record: TickRecord, timestamp: float) -> Map:

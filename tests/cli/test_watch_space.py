@@ -21,7 +21,7 @@ def touched() -> ScreenState:
         at = (1e-4 * n, 0.0, 0.0298)
         force = (1.2, 0.0, 2.4)
         known.take([Position(0.01 * n, n, at, (0.0,) * 3, force, force)], 0.0)
-        known.take([Touch(0.01 * n, n, 0, (at[0], 0.0, 0.03), (0.0, 0.0, 1.0), 2e-4, force, True)], 0.0)
+        known.take([Touch(0.01 * n, n, force, 0, (at[0], 0.0, 0.03), (0.0, 0.0, 1.0), 2e-4, True)], 0.0)
     known.take([Damping(1.0, 99, (20.5, 0.0), (True, False), (0.0, 0.0))], 0.0)
     return known
 
@@ -85,10 +85,17 @@ def test_couplings_and_forces_stand_behind_walls_and_objects_under_their_names()
     known.take([dataclasses.replace(STATUS, remote_name=("ball", "tool", "field"), remote_kind=kinds)], 0.0)
     values = (7.5, 20.5, 0.0, 3.5, 0.0)
     known.take([Damping(1.0, 99, values, (False, True, False, True, False), (0.0,) * 5)], 0.0)
+    ball = Touch(1.0, 100, (0.0, 0.0, 2.4), 0, (0.0, 0.0, 0.03), (0.0, 0.0, 1.0), 2e-4, True, 0, (0,), 0, 17)
+    tool = Touch(0.99, 99, (0.3, 0.0, -0.4), remote=1, remote_seq=42, target_m=(0.0, 0.0, 0.01))
+    known.take([ball, tool, Touch(0.9, 90, (0.0, 0.0, 1.0), remote=2)], 0.0)
     text = "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
     assert text.count("wall 0") == 1
     assert "wall 1" not in text
-    assert "client's tool  ● held     damping    3.5 N s/m" in text
+    assert "client's tool  ● held     damping    3.5 N s/m  pushes  0.50 N -z+x  message 42" in text
     assert "client's field  ○ let go   damping    0.0 N s/m" in text
-    assert "damping 20.5 N s/m  sliding" in text
-    assert "tool held damping 3.5 N s/m" in one_line(known)
+    assert text.count("pushes") == 2
+    assert "damping 20.5 N s/m  message 17  sliding" in text
+    assert "tool held 0.50 N damping 3.5 N s/m" in one_line(known)
+    assert "field let go damping 0.0 N s/m" in one_line(known)
+    known.take([Touch(1.0, 100, (0.1, 0.0, 0.0), remote=1)], 0.0)
+    assert "0.10 N +x  fades out" in "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
-from hapticd.cli.watch.contacts import count_walls, of_objects, of_ports
+from hapticd.cli.watch.contacts import count_walls, of_objects
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, bars, plot
+from hapticd.cli.watch.ports import port_lines, port_words
 from hapticd.cli.watch.space import VIEW_ROWS, contact_lines, views
 from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Position, Status
@@ -85,10 +86,7 @@ def one_line(known: ScreenState) -> str:
     if known.damping:
         walls = count_walls(known.damping, status)
         parts += [f"damping {damping:.1f} N s/m" for damping in known.damping.damping_n_s_per_m[:walls]]
-        parts += [
-            f"{name} {'held' if held else 'let go'} damping {damping:.1f} N s/m"
-            for name, held, damping in of_ports(known.damping, status)
-        ]
+        parts += port_words(known.pushes, known.damping, status)
     if status.object_name:
         parts += [line.plain.strip() for line in contact_lines(known.trail, status, of_objects(known.damping, status))]
     if known.energy:
@@ -308,11 +306,7 @@ def _walls(known: ScreenState, status: Status, width: int) -> list[Text]:
         lines.append(line)
     if count > _MOST_WALLS:
         lines[-1] = _spread(lines[-1], Text(f"+{count - _MOST_WALLS} walls ", style=_QUIET), width)
-    for name, held, value in of_ports(known.damping, status)[:_MOST_WALLS]:
-        line = _quiet(" client's ").append(name, "bold")
-        line.append("  ● held   " if held else "  ○ let go ", "bold cyan" if held else _QUIET)
-        lines.append(line.append("  damping ", _QUIET).append(f"{value:6.1f}", "bold").append(" N s/m"))
-    return lines
+    return [*lines, *port_lines(known.pushes, known.damping, status)]
 
 
 def _energy(known: ScreenState, width: int) -> Text:

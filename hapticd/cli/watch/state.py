@@ -23,6 +23,7 @@ class ScreenState:
         heard_s: when anything came last, on the caller's clock [s].
         lost: ticks that this viewer did not get.
         trail: where a device with three axes was, and what it touches.
+        pushes: what each coupling and force did when it was last in force, by its index among what clients drive.
     """
 
     def __init__(self) -> None:
@@ -35,6 +36,7 @@ class ScreenState:
         self.heard_s = -math.inf
         self.lost = 0
         self.trail = Trail()
+        self.pushes: dict[int, Touch] = {}
         self.positions = Trace(0)
         self.forces = Trace(0)
         self.dampings: list[deque[float]] = []
@@ -55,6 +57,8 @@ class ScreenState:
                     self._take_position(record)
                 case Energy():
                     self.energy = record
+                case Touch() if record.object < 0:
+                    self.pushes[record.remote] = record
                 case Touch():
                     self.trail.touch(record)
                 case Damping():

@@ -66,6 +66,11 @@ class Port:
         self._told = False
 
     @property
+    def object_index(self) -> int:
+        """Which object of the scene it is; -1: none."""
+        return -1
+
+    @property
     def work_j(self) -> float:
         """What the client's motion, changes and forces have put in, less what they took [J]."""
         raise NotImplementedError

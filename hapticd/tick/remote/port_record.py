@@ -13,6 +13,8 @@ if TYPE_CHECKING:  # clients read records without the tick that makes them
 MOST_PORTS = 24
 """Most ports in one record: couplings and forces first, then the remote objects that are touched."""
 
+_SCALARS = 9
+
 
 @dataclass(slots=True)
 class PortRecord:
@@ -20,6 +22,7 @@ class PortRecord:
 
     Attributes:
         index: of the port in the scene: remote objects, couplings, forces.
+        object: index of the object in the scene; -1: it is a coupling or a force.
         state: how it stands with its client, as `PortState`.
         seq: the client's own number of the message in force; -1: none is.
         age_s: since it was taken [s].
@@ -33,6 +36,7 @@ class PortRecord:
     """
 
     index: int
+    object: int
     state: int
     seq: int
     age_s: float
@@ -71,7 +75,7 @@ class PortLayout:
 
     def __init__(self, axes: int) -> None:
         self._axes = axes
-        one = "qqqddddd" + "d" * (3 * axes)
+        one = "qqqqddddd" + "d" * (3 * axes)
         self._structs = [Struct(f"<qqqd{one * shown}") for shown in range(MOST_PORTS + 1)]
         self.size = self._structs[-1].size
         self.format = self._structs[-1].format[1:]
@@ -92,7 +96,7 @@ class PortLayout:
             shown = sorted(shown, key=_rank)[:MOST_PORTS]
         values: list[float] = []
         for index, port in shown:
-            values += (index, port.state, port.seq, port.age_s, *port.law_values(), port.work_j)
+            values += (index, port.object_index, port.state, port.seq, port.age_s, *port.law_values(), port.work_j)
             values += port.target_m
             values += port.force_n
             values += port.impulse_n_s
@@ -103,13 +107,13 @@ class PortLayout:
         shown = int.from_bytes(row[at : at + 8], "little")
         values = self._structs[shown].unpack_from(row, at)
         axes = self._axes
-        each = 8 + 3 * axes
+        each = _SCALARS + 3 * axes
         _, count, objects, work_j = values[:4]
         ports = []
         for start in range(4, len(values), each):
             one = values[start : start + each]
-            vectors = [tuple(one[8 + n * axes : 8 + (n + 1) * axes]) for n in range(3)]
-            ports.append(PortRecord(*one[:8], *vectors))
+            vectors = [tuple(one[_SCALARS + n * axes : _SCALARS + (n + 1) * axes]) for n in range(3)]
+            ports.append(PortRecord(*one[:_SCALARS], *vectors))
         return PortsRecord(count, objects, work_j, tuple(ports))
 
 

@@ -48,6 +48,11 @@ class RemoteObject(Port):
         self.stop(first.position_m)
 
     @property
+    def object_index(self) -> int:
+        """Which object of the scene it is."""
+        return self._contact.solid.index
+
+    @property
     def work_j(self) -> float:
         """What the client's motion and changes have put in, less what they took [J]."""
         return self._contact.moved_j

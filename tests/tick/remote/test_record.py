@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hapticd.config.walls import MAX_WALLS
-from hapticd.telemetry.wire import Objects, damping_map, energy_map
+from hapticd.telemetry.wire import Objects, contact_maps, damping_map, energy_map
 from hapticd.tick.record import RecordLayout, TickRecord
 from hapticd.tick.remote.port import PortState
 from tests.tick.remote.rig import COUPLING, FORCE_PORT, WALL, Rig
@@ -35,7 +35,7 @@ def test_it_says_how_each_port_stands(axes: str, scene: str) -> None:
     assert (record.ports.count, record.ports.objects) == (2, 0)
     tool, field = record.ports.shown
     port = rig["tool"]
-    assert (tool.index, tool.state, tool.seq) == (0, PortState.HELD, rig.seq)
+    assert (tool.index, tool.object, tool.state, tool.seq) == (0, -1, PortState.HELD, rig.seq)
     assert tool.age_s == pytest.approx(1e-3)
     assert tool.stiffness_n_per_m == 2000.0
     assert tool.damping_n_s_per_m == max(channel.damping_n_s_per_m for channel in port.channels) > 0.0
@@ -47,6 +47,16 @@ def test_it_says_how_each_port_stands(axes: str, scene: str) -> None:
     assert len(record.walls) == scene.count("walls")
     assert (record.space is not None) == ("objects" in scene)
     totals = rig.tick.totals().ledger
+    assert contact_maps(record, 0.5) == [
+        {
+            "timestamp": 0.5,
+            "seq": 7,
+            "force_n": list(tool.force_n),
+            "remote": 0,
+            "remote_seq": rig.seq,
+            "target_m": list(tool.target_m),
+        }
+    ], "the force is not in force, and nothing is touched"
     assert (record.energy_j, record.spring_energy_j) == (totals.energy_j, totals.stored_j)
     seen = damping_map(record, 0.0, Objects().see(record))
     assert seen["in_contact"][-2:] == [True, False]
