@@ -13,8 +13,8 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/tick/scene.py: Wall.stored_j: if x_m >= 0.0:  [GtE 0 is Gt]",
         "controllers/hapticd_controllers/virtual_coupling.py: step: if proxy_m < 0.0:  [Lt 0 is LtE]",
         "hapticd/tick/guard.py: blended: if weight >= 1.0:  [GtE 0 is Gt]",
-        "hapticd/tick/contact.py: Contact.settle: self._applied_spring_n = gain * (spring_n if spring_n <= limit_n else "
-        "limit_n)  [LtE 0 is Lt]",
+        "hapticd/tick/contact.py: Contact.settle: self._applied_spring_n = gain * (spring_n if spring_n <= limit_n "
+        "else limit_n)  [LtE 0 is Lt]",
         "hapticd/tick/guard.py: blended: weight: float = done / state.blend_ticks if done > 0.0 else 0.0  "
         "[Gt 0 is GtE]",
         "controllers/hapticd_controllers/tdpa.py: _bounded: if -LIMIT < value < LIMIT:  [Lt 0 is LtE]",

@@ -75,7 +75,7 @@ def test_a_target_is_followed_and_the_client_learns_from_which_tick_on(tool: Rem
     with pytest.raises(RefusedError, match="must be 0 to 300"):
         hold(tool, 0.01)
     with pytest.raises(ValueError, match=r"position_m = 0\.01: must be a list of numbers"):
-        tool.move(0.01)  # type: ignore[arg-type]
+        tool.move(0.01)  # type: ignore[arg-type]  # a number is no list
     tool.move(np.array([0.01], np.float32))  # type: ignore[arg-type]  # as simulators have it
     tool.change(stiffness_n_per_m=100.0)
     sent = tool.seq
