@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import random
 import signal
@@ -244,3 +245,14 @@ def test_a_request_that_the_loop_never_sees_is_answered_when_the_daemon_ends(dae
     assert not answer["ok"]
     assert "stopped" in answer["text"]
     assert daemon.wait_exit() == 1
+
+
+def test_what_is_asked_while_it_starts_is_answered_by_what_it_runs() -> None:
+    with Daemon("") as daemon, zmq.Context() as context, context.socket(zmq.DEALER) as socket:
+        socket.setsockopt(zmq.LINGER, 0)
+        socket.setsockopt(zmq.RECONNECT_IVL, 1)
+        socket.connect(f"ipc://{daemon.directory}/run/default/control")
+        socket.send(msgpack.packb({"do": "status"}))
+        assert socket.poll(PATIENCE_MS)
+        status = msgpack.unpackb(socket.recv())["status"]
+        assert status["config_hash"] == hashlib.sha256(b"").hexdigest()[:12]
