@@ -258,9 +258,9 @@ def test_a_subscriber_that_never_reads_costs_the_others_nothing(daemon: Daemon, 
         subscriber.setsockopt(zmq.SUBSCRIBE, b"")
         subscriber.connect(f"ipc://{runtime(daemon)}/state")
     told = [heard(reader)]
-    while told[-1] < told[0] + 4000:
+    while told[-1] < told[0] + 2000:
         told.append(heard(reader))
-    assert len(told) > 3200, "a busy computer may cost some, a subscriber that stands still none"
+    assert len(told) > 1600, "a busy computer may cost some, a subscriber that stands still none"
     got = [heard(stalled)]
     while stalled.poll(100) and got[-1] <= told[-1]:
         got.append(heard(stalled))
