@@ -63,7 +63,7 @@ def tool(daemon: Daemon) -> Iterator[RemotePort]:
 def test_a_target_is_followed_and_the_client_learns_from_which_tick_on(tool: RemotePort) -> None:
     assert (tool.kind, tool.axes, tool.limits["max_force_n"]) == ("coupling", ("x",), MAX_FORCE_N)
     hold(tool, 0.01, 400)
-    state = tool.state()
+    state = tool.state(20.0)
     assert state.armed
     assert state.port is not None
     assert state.port.state == "held"
@@ -165,7 +165,7 @@ def test_nothing_hostile_gets_in_or_holds_the_loop_up(daemon: Daemon, tool: Remo
     """
     hold(tool, 0.0)
     heard_before = refused(daemon)
-    first = tool.state()
+    first = tool.state(20.0)
     memory = daemon.memory()
     missed: list[tuple[int, int]] = []
     with Flood(daemon) as flood:
@@ -184,7 +184,7 @@ def test_nothing_hostile_gets_in_or_holds_the_loop_up(daemon: Daemon, tool: Remo
         wait_until(lambda: refused(daemon) - heard_before >= 0.7 * flood.sent, "the flood to have been heard")
     hear_all_refusals(tool)
     hold_at_last(tool, 0.0)
-    last = tool.state()
+    last = tool.state(20.0)
     assert last.port is not None
     assert last.port.state == "held"
     records = [record for record in all_records(memory) if first.seq < record.seq <= last.seq]
@@ -207,7 +207,7 @@ def hear_all_refusals(tool: RemotePort) -> None:
                 tool.move([0.0])
                 tool.change(stiffness_n_per_m=1e9)
                 sent = True
-            tool.state()
+            tool.state(20.0)
         except RefusedError as error:
             if "stiffness_n_per_m" in str(error):
                 return
