@@ -258,7 +258,7 @@ def _end(
             state.brake = 0.0
         state.swings += 1.0
     elif not quick:
-        state.leaks = max(1.0, SLOWER * state.leaks)
+        _relax(state, SLOWER)
         state.brake = 0.0
         if state.felt_mass_kg == 0.0 and not whole:
             state.swings += 1.0
@@ -295,6 +295,14 @@ def _brake(state: Any, params: Any) -> None:
     state.brake = ratio
 
 
+def _relax(state: Any, share: float) -> None:
+    """A share of the base that is there: leaks go on growing where the mass limits it, and are not waited for."""
+    leaks = state.leaks
+    if state.leak_n_s_per_m > 0.0:
+        leaks = min(leaks, state.base_n_s_per_m / state.leak_n_s_per_m)
+    state.leaks = max(1.0, share * leaks)
+
+
 def _listen(state: Any, params: Any, in_contact: bool) -> None:
     """Silence ends the ring, and with it the brake; the next ring begins with less if this one was harmless."""
     if state.last_s == 0.0 or state.swing_s <= (SILENCE * state.last_s if in_contact else FLIGHT_S):
@@ -309,7 +317,7 @@ def _listen(state: Any, params: Any, in_contact: bool) -> None:
     state.swings = 0.0
     state.stubborn = 0.0
     if not in_contact:
-        state.leaks = max(1.0, LEFT * state.leaks)
+        _relax(state, LEFT)
         state.last_s = 0.0
         state.age = 0.0
         state.base_n_s_per_m = min(state.base_n_s_per_m, state.leaks * state.leak_n_s_per_m)

@@ -221,6 +221,18 @@ def test_the_base_relaxes_when_another_hand_takes_over() -> None:
     assert rig.state.base_n_s_per_m < 1.1 * leak(late)
 
 
+def test_a_base_that_the_mass_limits_relaxes_from_where_it_is() -> None:
+    """No base holds this wall undamped: its leaks grow without end, and the next hand does not wait for them."""
+    late = Device(stiffness_n_per_m=25e3, viscous_n_s_per_m=0.5, resolution_m=2e-6, delay_samples=1, hand_n=-3.3)
+    rig = rig_on(late)
+    rig.run(6.0)
+    learned = rig.state.base_n_s_per_m
+    assert rig.state.leaks > 10.0 * learned / leak(late)
+    rig.change(viscous_n_s_per_m=30.0)
+    tap(rig)
+    assert rig.state.base_n_s_per_m <= 0.5 * learned
+
+
 # What it learns
 
 
