@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import csv
+import io
+
 import pytest
 
 from hapticd.config.walls import MAX_WALLS
+from hapticd.faults.export import write_csv
+from hapticd.faults.record import FaultRecord
 from hapticd.telemetry.wire import Objects, contact_maps, damping_map, energy_map
 from hapticd.tick.record import RecordLayout, TickRecord
 from hapticd.tick.remote.port import PortState
 from tests.tick.remote.rig import COUPLING, FORCE_PORT, WALL, Rig
 
 BALL = '[[scene.objects]]\nname = "ball"\nshape = "sphere"\nradius_m = 0.03\nstiffness_n_per_m = 500.0\n'
+MOVING = BALL + "position_m = [0.0, 0.0, -0.05]\nremote = true\n"
 
 
 def recorded(rig: Rig) -> TickRecord:
@@ -73,3 +79,21 @@ def test_more_ports_than_a_record_has_room_for_leave_out_objects_and_never_a_cou
     record = recorded(rig)
     assert record.ports is not None
     assert [one.index for one in record.ports.shown] == list(range(16))
+
+
+def test_a_table_of_a_fault_has_of_each_port_the_message_in_force() -> None:
+    rig = Rig(MOVING + COUPLING, axes="xyz")
+    rig.go([0.0, 0.0, 0.0])
+    rig.say("ball", position_m=[0.0, 0.0, -0.02])
+    rig.go(ticks=20)
+    rig.say("tool", position_m=[0.01, 0.0, 0.0])
+    rig.go(ticks=20)
+    table = io.StringIO()
+    write_csv(FaultRecord("one", {"event": {"deadline_ns": 0}}, [recorded(rig)]), table)
+    table.seek(0)
+    (row,) = csv.DictReader(table)
+    assert (row["object[port 0]"], row["seq[port 0]"]) == ("0", "1")
+    assert (row["object[port 1]"], row["seq[port 1]"]) == ("-1", "2")
+    assert float(row["target_m[port 0][2]"]) == rig["ball"].target_m[2]
+    assert float(row["force_n[port 1][0]"]) == rig["tool"].force_n[0] > 0.0
+    assert None not in row, "every value has its column"
