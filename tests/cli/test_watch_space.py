@@ -91,10 +91,10 @@ def test_couplings_and_forces_stand_behind_walls_and_objects_under_their_names()
     text = "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
     assert text.count("wall 0") == 1
     assert "wall 1" not in text
-    assert "client's tool  ● held     damping    3.5 N s/m  pushes  0.50 N -z+x  message 42" in text
+    assert "client's tool  ● held     pushes  0.50 N -z+x  message 42  damping    3.5 N s/m" in text
     assert "client's field  ○ let go   damping    0.0 N s/m" in text
     assert text.count("pushes") == 2
-    assert "damping 20.5 N s/m  message 17  sliding" in text
+    assert "damping 20.5 N s/m  sliding  message 17" in text
     assert "tool held 0.50 N damping 3.5 N s/m" in one_line(known)
     assert "field let go damping 0.0 N s/m" in one_line(known)
     known.take([Touch(1.0, 100, (0.1, 0.0, 0.0), remote=1)], 0.0)

@@ -52,6 +52,7 @@ hold_s = 0.5
 name = "field"
 max_force_n = 3.0
 hold_s = 0.5
+unchanged_s = 0.0
 """
 
 

@@ -29,13 +29,12 @@ def port_lines(pushes: Mapping[int, Touch], damping: Damping | None, status: Sta
     for name, held, value in of_ports(damping, status)[:MOST_LINES]:
         line = Text(" client's ", style=_QUIET).append(name, "bold")
         line.append("  ● held   " if held else "  ○ let go ", "bold cyan" if held else _QUIET)
-        line.append("  damping ", _QUIET).append(f"{value:6.1f}", "bold").append(" N s/m", "default")
         push = _push(pushes, status, name)
         if held and push is not None:
             line.append("  pushes ", _QUIET).append(f"{math.hypot(*push.force_n):5.2f} N", "bold")
             line.append(f" {direction(push.force_n)}", "default")
             line.append(f"  message {push.remote_seq}" if push.remote_seq >= 0 else "  fades out", _QUIET)
-        lines.append(line)
+        lines.append(line.append("  damping ", _QUIET).append(f"{value:6.1f}", "bold").append(" N s/m", "default"))
     return lines
 
 

@@ -76,8 +76,8 @@ def contact_lines(trail: Trail, status: Status, dampings: Sequence[float]) -> li
         line.append(f"{newton:5.2f} N", "bold").append(f" {direction(touch.force_n)}", "default")
         if touch.object < len(dampings):
             line.append("  damping ", _QUIET).append(f"{dampings[touch.object]:.1f}").append(" N s/m", _QUIET)
-        line.append(f"  message {touch.remote_seq}" if touch.remote_seq >= 0 else "", _QUIET)
-        lines.append(line.append("  sliding" if touch.sliding else "", "yellow"))
+        line.append("  sliding" if touch.sliding else "", "yellow")
+        lines.append(line.append(f"  message {touch.remote_seq}" if touch.remote_seq >= 0 else "", _QUIET))
     return lines
 
 
