@@ -90,6 +90,11 @@ class Placed:
         known: dict[str, float | int | bool] = {"kind": KINDS[self.shape], "sign": sign, "a": a, "b": b, "c": c, "r": r}
         return known if self.field is None else known | self.field.scalars()
 
+    @property
+    def creases(self) -> bool:
+        """Whether it may bend inwards by itself: a mesh, and a room with edges."""
+        return self.shape == "mesh" or (self.inside and self.shape in ("box", "cylinder"))
+
     def centre_m(self) -> Vector:
         """Middle of the balls of `outer_m` and `inner_m`, in the frame around [m]."""
         return self.pose.position_m if self.field is None else self.pose.point(self.field.centre_m)

@@ -116,7 +116,6 @@ class SpaceRun:
         contacts = np.zeros(len(solids), dtype(solids[0], several))
         for row, contact in zip(contacts, solids, strict=True):
             fill(row, contact)
-            row["sides"] = len(contact.channels)
         axes = device.axes
         matrices = device.masses
         return [

@@ -23,6 +23,7 @@ from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.guard import Guard
 from hapticd.tick.space.channel import Channel, Direction
+from hapticd.tick.space.crease import grip
 from hapticd.tick.space.solid import Solid
 from hapticd.tick.space.solid_contact import SolidContact
 from hapticd.tick.velocity import Difference
@@ -89,16 +90,14 @@ class SpaceMachine:
                 SolidContact: Form(
                     (
                         *("start", "observe", "act", "add", "settle"),
-                        *("_settle_rough", "_rest", "_lose", "_stand", "_face", "_stretch_m"),
+                        *("_rest", "_lose", "_stand", "_face"),
                     ),
                     instead={
                         "self.normal": "self.channels[0]",
-                        "self.channels": "self.channels[: self.sides]",
                         "proxy.voxels": "NO_VOXELS",
                         "channel.snapshot()": "channel.snapshot(0.0, self.ledger)",
                     },
                     without=("normal",),
-                    more={"sides": int},
                 ),
                 Channel: Form(
                     ("rest", "see", "apply", "act", "snapshot"),
@@ -120,7 +119,7 @@ class SpaceMachine:
                 "law_start": module.start,
                 "_number": _number,
             },
-            (Channel.__module__, run.__module__),
+            (Channel.__module__, grip.__module__, run.__module__),
             without_law(),
         )
 

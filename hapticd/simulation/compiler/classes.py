@@ -39,7 +39,6 @@ class Form:
         takes: further parameters of a method, by its name.
         without: fields that are left out, since the object is reached another way.
         kinds: types of its fields, where those of an example may be others.
-        more: further fields of its record and their types.
     """
 
     methods: tuple[str, ...] = ()
@@ -49,7 +48,6 @@ class Form:
     takes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     without: tuple[str, ...] = ()
     kinds: Mapping[str, type[Any]] = field(default_factory=dict)
-    more: Mapping[str, type[Any]] = field(default_factory=dict)
 
 
 class Machine:
@@ -109,7 +107,6 @@ class Machine:
             elif name in lists:
                 one, most = lists[name]
                 fields.append((name, self.dtype(one, lists), (most,)))
-        fields += [(name, _SCALARS[kind]) for name, kind in form.more.items()]
         return np.dtype(fields, align=True)
 
     def compiled(self, function: Callable[..., Any]) -> Any:

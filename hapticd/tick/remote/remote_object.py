@@ -14,7 +14,7 @@ from hapticd.tick.remote.follower import Follower
 from hapticd.tick.remote.port import Port
 from hapticd.tick.remote.turning import Turning, unit
 from hapticd.tick.remote.update import DAMPING, ORIENTATION, POSITION, STIFFNESS, TURNING, VELOCITY, Update
-from hapticd.tick.space.channel import Channel
+from hapticd.tick.space.channel import Channel, stretched_m
 from hapticd.tick.space.solid import Solid
 from hapticd.tick.space.solid_contact import SolidContact
 
@@ -228,10 +228,11 @@ class RemoteContact(SolidContact):
         super().settle(share, gain, limit_n, dt_s)
         if changed:
             solid.stiffness_n_per_m = self._before_n_per_m = now_n_per_m
-            self._spring_n = gain * min(now_n_per_m * self.depth_m, limit_n)
+            if self.sides == 1:
+                self.normal.held_n = gain * min(now_n_per_m * self.depth_m, limit_n)
             stored_j = 0.0
             if self.depth_m > 0.0 and now_n_per_m > 0.0:
-                stored_j = gain * solid.stored_j(self._stretch_m(), limit_n)
+                stored_j = gain * solid.stored_j(stretched_m(solid.proxy), limit_n)
             self.moved_j += stored_j - self.ledger.stored_j
             self.ledger.stored_j = stored_j
         self.port.force_n[:] = self.force

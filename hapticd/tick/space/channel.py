@@ -137,14 +137,23 @@ def lay_along(channels: Sequence[Channel]) -> None:
 
 
 def slip_along(
-    channels: Sequence[Channel], proxy: Any, stiffness_n_per_m: float, velocity: Vector, way: Vector, dt_s: float
+    channels: Sequence[Channel],
+    held: int,
+    depth_m: float,
+    stretch: Vector,
+    stiffness_n_per_m: float,
+    velocity: Vector,
+    way: Vector,
+    dt_s: float,
 ) -> None:
     """See a new sample along the surface; the first channel has its normal of now.
 
     Args:
         channels: of a solid, the normal first.
-        proxy: its proxy, which touches.
-        stiffness_n_per_m: of its spring [N/m].
+        held: how many directions along the surface are held, from the first on; the others are out of touch.
+        depth_m: of the device in the solid [m].
+        stretch: of the spring; what of it is along the normal does not count [m].
+        stiffness_n_per_m: of the spring [N/m].
         velocity: of the device [m/s].
         way: of the device since the last sample [m].
         dt_s: time since then [s].
@@ -152,6 +161,7 @@ def slip_along(
     normal, first, second = channels
     vx, vy, vz = velocity
     wx, wy, wz = way
+    sx, sy, sz = stretch
     nx, ny, nz = normal.dx, normal.dy, normal.dz
     first_m = first.dx * wx + first.dy * wy + first.dz * wz
     second_m = second.dx * wx + second.dy * wy + second.dz * wz
@@ -171,9 +181,56 @@ def slip_along(
         second.dy = nz * tx - nx * tz
         second.dz = nx * ty - ny * tx
     for channel, moved_m in ((first, first_m), (second, second_m)):
-        x_m = -(proxy.stretch_x * channel.dx + proxy.stretch_y * channel.dy + proxy.stretch_z * channel.dz)
+        x_m = -(sx * channel.dx + sy * channel.dy + sz * channel.dz)
         if -LEAST_M < x_m < LEAST_M:
             x_m = -LEAST_M
         v_m_per_s = channel.dx * vx + channel.dy * vy + channel.dz * vz
-        spring_n = -stiffness_n_per_m * x_m
-        channel.see(proxy.depth_m, x_m, moved_m, v_m_per_s, dt_s, spring_n, spring_n)
+        if held > 0:
+            spring_n = -stiffness_n_per_m * x_m
+            channel.see(depth_m, x_m, moved_m, v_m_per_s, dt_s, spring_n, spring_n)
+        else:
+            channel.see(0.0, 0.0, moved_m, v_m_per_s, dt_s, 0.0, 0.0)
+        held -= 1
+
+
+def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: float) -> None:
+    """Enter the tick into the books of a solid; each channel holds its part of the vector, along its own direction.
+
+    Args:
+        contact: of the solid.
+        share: how much of the force the guard let through, 0 to 1.
+        gain: how much of that a release has left, 0 to 1.
+        limit_n: the guard's limit for one contact [N].
+        dt_s: time since the last sample; 0: this is the same once more, and the books wait for the next [s].
+    """
+    solid = contact.solid
+    proxy = solid.proxy
+    normal, first, second = channels = contact.channels
+    stiffness_n_per_m = gain * solid.stiffness_n_per_m
+    stretch_m = stretched_m(proxy) if contact.depth_m > 0.0 else 0.0
+    if dt_s > 0.0:
+        taken_j = -normal.applied_n * normal.way_m - first.applied_n * first.way_m - second.applied_n * second.way_m
+        spring_j = -normal.held_n * normal.way_m - first.held_n * first.way_m - second.held_n * second.way_m
+        lost_j = stiffness_n_per_m * proxy.lost_m2
+        ledger = contact.ledger
+        stored_j = gain * solid.stored_j(stretch_m, limit_n)
+        ledger.update(-1.0, taken_j, spring_j, stored_j + lost_j, normal.in_contact, normal.damping_n_s_per_m, dt_s)
+        ledger.stored_j = stored_j
+        ledger.dissipated_j += lost_j
+        contact.friction_j += lost_j
+        along_m2 = proxy.stretch_x * proxy.stretch_x + proxy.stretch_y * proxy.stretch_y
+        contact.friction_stored_j = 0.5 * stiffness_n_per_m * (along_m2 + proxy.stretch_z * proxy.stretch_z)
+    held = gain
+    if solid.stiffness_n_per_m * stretch_m > limit_n:
+        held *= limit_n / (solid.stiffness_n_per_m * stretch_m)
+    for channel in channels:
+        channel.apply(share)
+        channel.held_n = held * channel.wall.spring_n
+
+
+def stretched_m(proxy: Any) -> float:
+    """Length of the whole spring, from the device to a proxy that touches [m]."""
+    sx = proxy.depth_m * proxy.normal_x + proxy.stretch_x
+    sy = proxy.depth_m * proxy.normal_y + proxy.stretch_y
+    sz = proxy.depth_m * proxy.normal_z + proxy.stretch_z
+    return sqrt(sx * sx + sy * sy + sz * sz)

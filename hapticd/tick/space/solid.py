@@ -48,6 +48,7 @@ class Solid:
         proxy: the point on its surface that pulls the device back; it keeps its own state.
         stiffness_n_per_m, damping_n_s_per_m: in force now.
         rough: whether it has friction.
+        creases: whether it may bend inwards, so that its proxy is pinned somewhere.
         remote: whether a client moves it.
 
     Raises:
@@ -56,6 +57,7 @@ class Solid:
 
     __slots__ = (
         "configs",
+        "creases",
         "damping_n_s_per_m",
         "index",
         "members",
@@ -83,6 +85,7 @@ class Solid:
         self.stiffness_n_per_m = first.stiffness_n_per_m
         self.damping_n_s_per_m = first.damping_n_s_per_m
         self.rough = first.static_friction > 0.0
+        self.creases = len(self.placed) > 1 or any(each.creases for each in self.placed)
 
     def stored_j(self, stretch_m: float, limit_n: float) -> float:
         """Energy in the spring [J]: k s^2 / 2, and force times length where the guard's limit flattens it.

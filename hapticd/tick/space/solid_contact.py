@@ -8,25 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from math import inf, sqrt
+from math import inf
 
 from hapticd.shapes.pose import Vector
 from hapticd.shapes.proxy import follow, place
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
-from hapticd.tick.space.channel import Channel, lay_along, slip_along
+from hapticd.tick.space.channel import Channel, lay_along, settle_along, slip_along, stretched_m
+from hapticd.tick.space.crease import TURNED, grip
 from hapticd.tick.space.solid import Solid
 
 OUTSIDE_S = 0.5
 """How long a law that keeps time outside is asked after the touch, such as of a ring that dies away [s]."""
-
-TURNED = 0.94
-"""Cosine of the turn of the normal, 20 degrees, after which a law forgets what it found out about its direction.
-
-A mass that was felt belongs to a direction: a damper that one axis bears may shake another that is five times lighter.
-What the law has learnt to be its damping goes on, under the bound that it gives itself while it knows no mass.
-"""
 
 
 class SolidContact:
@@ -38,7 +32,11 @@ class SolidContact:
         resolution_m: smallest step of the device's position [m].
 
     Attributes:
-        channels: along the normal, and where friction can stick two along the surface.
+        channels: along the normal, and where friction can stick or a crease may be two along the surface.
+        sides: how many of them have anything to do.
+        grip: in how many directions the proxy is pinned in a crease.
+        off_m: how far the proxy has gone across the crease since [m].
+        to_x, to_y, to_z: the way from the device to where its proxy would be without friction [m].
         ledger: the books of the whole vector.
         quiet: out of touch, without force, and nothing left to book.
         moved_j: work that changes of the solid itself did on its spring [J].
@@ -56,7 +54,6 @@ class SolidContact:
         "_away",
         "_moved_m",
         "_outside_s",
-        "_spring_n",
         "_ux",
         "_uy",
         "_uz",
@@ -64,13 +61,19 @@ class SolidContact:
         "depth_m",
         "friction_j",
         "friction_stored_j",
+        "grip",
         "leaving",
         "ledger",
         "moved_j",
         "normal",
+        "off_m",
         "quiet",
         "resolution_m",
+        "sides",
         "solid",
+        "to_x",
+        "to_y",
+        "to_z",
         "turned",
     )
 
@@ -80,8 +83,7 @@ class SolidContact:
         self.ledger = EnergyLedger()
         self.normal = Channel(make_law(), resolution_m, self.ledger)
         self.channels = [self.normal]
-        if solid.rough:
-            self.channels += [Channel(make_law(), resolution_m, self.ledger) for _ in range(2)]
+        self.channels += self.rougher(solid, make_law)
         self.quiet = True
         self.leaving = False
         self.moved_j = 0.0
@@ -92,9 +94,11 @@ class SolidContact:
         self._moved_m = 0.0
         self._outside_s = 0.0
         self.turned = False
-        self._spring_n = 0.0
         self._ux = self._uy = 0.0
         self._uz = 1.0
+        self.sides = 3 if solid.rough else 1
+        self.grip = 0
+        self.off_m = self.to_x = self.to_y = self.to_z = 0.0
 
     @property
     def in_contact(self) -> bool:
@@ -120,7 +124,7 @@ class SolidContact:
 
     def rougher(self, solid: Solid, make_law: Callable[[], RunningLaw]) -> list[Channel]:
         """Channels along the surface that another solid in the place of this one needs, and this one has not."""
-        if not solid.rough or len(self.channels) == 3:
+        if not (solid.rough or solid.creases) or len(self.channels) == 3:
             return []
         return [Channel(make_law(), self.resolution_m, self.ledger) for _ in range(2)]
 
@@ -133,6 +137,7 @@ class SolidContact:
             channel.dx, channel.dy, channel.dz = of.dx, of.dy, of.dz
             channel.in_contact, channel.x_m, channel.applied_n = of.in_contact, of.x_m, of.applied_n
         shade.depth_m = self.depth_m
+        shade.grip, shade.sides = self.grip, self.sides
         shade.quiet = False
         return shade
 
@@ -149,7 +154,7 @@ class SolidContact:
         """
         stays = solid.inherit(self.solid)
         self.solid = solid
-        if not solid.rough:
+        if not (solid.rough or solid.creases):
             del self.channels[1:]
         self.channels += along
         for channel in self.channels:
@@ -204,13 +209,24 @@ class SolidContact:
             self.quiet = False
             normal.dx, normal.dy, normal.dz = nx, ny, nz
         self._moved_m = moved_m = normal.dx * wx + normal.dy * wy + normal.dz * wz
+        if solid.creases:
+            before = self.grip
+            nx, ny, nz = grip(self, proxy, way)
+            self.sides = 3 if solid.rough else 1 + max(self.grip, before)
         normal.dx = nx
         normal.dy = ny
         normal.dz = nz
         vx, vy, vz = velocity
-        if solid.rough:
-            reach_m += nx * proxy.stretch_x + ny * proxy.stretch_y + nz * proxy.stretch_z
-            slip_along(self.channels, proxy, solid.stiffness_n_per_m, velocity, way, dt_s)
+        if self.sides > 1:
+            sx, sy, sz = proxy.stretch_x, proxy.stretch_y, proxy.stretch_z
+            if self.grip > 0:
+                reach_m = 0.0
+                sx += self.depth_m * proxy.normal_x
+                sy += self.depth_m * proxy.normal_y
+                sz += self.depth_m * proxy.normal_z
+            reach_m += nx * sx + ny * sy + nz * sz
+            held = 2 if solid.rough else self.grip
+            slip_along(self.channels, held, self.depth_m, (sx, sy, sz), solid.stiffness_n_per_m, velocity, way, dt_s)
         if nx * self._ux + ny * self._uy + nz * self._uz < TURNED:
             self.turned = True
         v_m_per_s = nx * vx + ny * vy + nz * vz
@@ -230,12 +246,12 @@ class SolidContact:
             BaseException: whatever a law raises.
         """
         if self.turned:
-            proxy = self.solid.proxy
-            self._ux, self._uy, self._uz = proxy.normal_x, proxy.normal_y, proxy.normal_z
+            normal = self.normal
+            self._ux, self._uy, self._uz = normal.dx, normal.dy, normal.dz
             self.turned = False
-            for channel in self.channels:
+            for channel in self.channels[: self.sides]:
                 channel.law.start(channel.snapshot())
-        for channel in self.channels:
+        for channel in self.channels[: self.sides]:
             channel.act(periods)
 
     def hold(self, periods: float) -> None:
@@ -251,7 +267,7 @@ class SolidContact:
         """
         blending = False
         x, y, z = force_n
-        for channel in self.channels:
+        for channel in self.channels[: self.sides]:
             newton = channel.force_n
             x += channel.dx * newton
             y += channel.dy * newton
@@ -279,16 +295,18 @@ class SolidContact:
             dt_s: time since the last sample; 0: this is the same once more, and the books wait for the next [s].
         """
         solid = self.solid
-        if solid.rough:
-            self._settle_rough(share, gain, limit_n, dt_s)
+        depth_m = self.depth_m
+        if self.sides > 1:
+            settle_along(self, share, gain, limit_n, dt_s)
+            if depth_m == 0.0:
+                self._rest()
             return
         normal = self.normal
-        depth_m = self.depth_m
         if dt_s > 0.0:
             self.ledger.update(
                 self._moved_m,
                 normal.applied_n,
-                self._spring_n,
+                normal.held_n,
                 gain * solid.stored_j(depth_m, limit_n),
                 normal.in_contact,
                 normal.damping_n_s_per_m,
@@ -297,7 +315,7 @@ class SolidContact:
         normal.apply(share)
         if depth_m > 0.0:
             spring_n = solid.stiffness_n_per_m * depth_m
-            self._spring_n = gain * (spring_n if spring_n <= limit_n else limit_n)
+            normal.held_n = gain * (spring_n if spring_n <= limit_n else limit_n)
         else:
             self._rest()
 
@@ -311,38 +329,9 @@ class SolidContact:
             sum([channel.dz * channel.applied_n for channel in channels]),
         )
 
-    def _settle_rough(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
-        """The same with friction: each channel holds its part of the vector, along its own direction."""
-        solid = self.solid
-        proxy = solid.proxy
-        normal, first, second = channels = self.channels
-        depth_m = self.depth_m
-        stiffness_n_per_m = gain * solid.stiffness_n_per_m
-        stretch_m = self._stretch_m() if depth_m > 0.0 else 0.0
-        if dt_s > 0.0:
-            taken_j = -normal.applied_n * normal.way_m - first.applied_n * first.way_m - second.applied_n * second.way_m
-            spring_j = -normal.held_n * normal.way_m - first.held_n * first.way_m - second.held_n * second.way_m
-            lost_j = stiffness_n_per_m * proxy.lost_m2
-            ledger = self.ledger
-            stored_j = gain * solid.stored_j(stretch_m, limit_n)
-            ledger.update(-1.0, taken_j, spring_j, stored_j + lost_j, normal.in_contact, normal.damping_n_s_per_m, dt_s)
-            ledger.stored_j = stored_j
-            ledger.dissipated_j += lost_j
-            self.friction_j += lost_j
-            along_m2 = proxy.stretch_x * proxy.stretch_x + proxy.stretch_y * proxy.stretch_y
-            self.friction_stored_j = 0.5 * stiffness_n_per_m * (along_m2 + proxy.stretch_z * proxy.stretch_z)
-        held = gain
-        if solid.stiffness_n_per_m * stretch_m > limit_n:
-            held *= limit_n / (solid.stiffness_n_per_m * stretch_m)
-        for channel in channels:
-            channel.apply(share)
-            channel.held_n = held * channel.wall.spring_n
-        if depth_m == 0.0:
-            self._rest()
-
     def _rest(self) -> None:
         """Be out of touch: nothing is left to do once laws that keep time have had the time that they look at."""
-        self._spring_n = 0.0
+        self.normal.held_n = 0.0
         self.quiet = self.normal.law.rests or self._outside_s > OUTSIDE_S
 
     def _lose(self, velocity: Vector, way: Vector, dt_s: float) -> bool:
@@ -363,11 +352,13 @@ class SolidContact:
         """Stand where the proxy says, at rest and without force."""
         proxy = self.solid.proxy
         self.depth_m = depth_m = proxy.depth_m if proxy.touching else 0.0
-        for channel in self.channels:
+        self.sides = 3 if self.solid.rough else 1
+        self.grip = 0
+        for channel in self.channels[: self.sides]:
             channel.in_contact = depth_m > 0.0
             channel.x_m = -depth_m
         self.normal.x_of_law_m = -depth_m
-        self._spring_n = self._moved_m = self._outside_s = 0.0
+        self.normal.held_n = self._moved_m = self._outside_s = 0.0
         self._away = False
         self._face()
         self.quiet = depth_m == 0.0 and self.ledger.stored_j == 0.0
@@ -380,20 +371,13 @@ class SolidContact:
         self._ux = normal.dx = nx
         self._uy = normal.dy = ny
         self._uz = normal.dz = nz
+        self.to_x, self.to_y, self.to_z = self.depth_m * nx, self.depth_m * ny, self.depth_m * nz
         self.turned = False
         if len(self.channels) == 3:
             lay_along(self.channels)
 
-    def _stretch_m(self) -> float:
-        """Length of the whole spring, from the device to the proxy [m]."""
-        proxy = self.solid.proxy
-        sx = self.depth_m * proxy.normal_x + proxy.stretch_x
-        sy = self.depth_m * proxy.normal_y + proxy.stretch_y
-        sz = self.depth_m * proxy.normal_z + proxy.stretch_z
-        return sqrt(sx * sx + sy * sy + sz * sz)
-
     def _restore(self, limit_n: float) -> None:
         """Book what a change of the solid does to its spring."""
-        stored_j = self.solid.stored_j(self._stretch_m(), limit_n) if self.depth_m > 0.0 else 0.0
+        stored_j = self.solid.stored_j(stretched_m(self.solid.proxy), limit_n) if self.depth_m > 0.0 else 0.0
         self.moved_j += stored_j - self.ledger.stored_j
         self.ledger.stored_j = stored_j
