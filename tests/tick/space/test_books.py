@@ -19,6 +19,7 @@ SHAPES = {
     "capsule": table("capsule", "capsule", radius_m=0.02, length_m=0.03, orientation=(1.0, 1.0, 0.0, 0.0)),
     "cylinder": table("cylinder", "cylinder", radius_m=0.025, length_m=0.04, rounding_m=0.001),
     "plane": table("plane", "plane", position_m=(0.0, 0.0, 0.028), orientation=(1.0, 0.1, 0.2, 0.0)),
+    "room": table("room", "box", inside=True, size_m=(0.004, 0.004, 0.03), position_m=(0.005, 0.002, 0.03)),
     "two": ball("left", position_m=(-0.02, 0.0, 0.0)) + ball("right", 8000.0, position_m=(0.02, 0.0, 0.0)),
 }
 ROUGH = "static_friction = 0.7\ndynamic_friction = 0.5\n"

@@ -72,6 +72,17 @@ def test_a_mesh_costs_at_most_2_5_walls(wall: float, tmp_path: Path) -> None:
     assert per_tick(table("mesh", "mesh", file=str(file))) <= 2.5 * wall
 
 
+def test_a_crease_costs_its_law_across_while_the_proxy_is_pinned_and_a_tenth_of_a_wall_else(wall: float) -> None:
+    """A stroke that swings across where two slabs meet, and one over a slab that meets another far off."""
+    lean = (math.cos(math.pi / 8.0), 0.0, math.sin(math.pi / 8.0), 0.0)
+    back = (lean[0], 0.0, -lean[2], 0.0)
+    middle, aside = (0.0, 0.0, 0.03), (-0.05, 0.0, 0.03)
+    left = table("left", "plane", position_m=middle, orientation=lean)
+    assert per_tick(left + table("right", "plane", position_m=middle, orientation=back)) <= 5.5 * wall
+    floor = table("floor", "plane", position_m=middle)
+    assert per_tick(floor + table("wall", "plane", position_m=aside, orientation=lean)) <= 2.0 * wall
+
+
 def test_of_64_objects_those_that_are_not_touched_cost_nothing() -> None:
     assert per_tick(ball() + "".join(FAR)) <= 2.0 * per_tick(ball())
 
