@@ -23,7 +23,8 @@ SERVICE_EXTRAS = ("metrics", "dashboard")
 
 def build(folder: Path, source: Path, kind: str) -> Path:
     done = subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", folder],
+        # Without bytecode, which the build's own hook would leave in the tree.
+        [sys.executable, "-B", "-m", "hatchling", "build", "-t", kind, "-d", folder],
         cwd=source,
         capture_output=True,
         text=True,

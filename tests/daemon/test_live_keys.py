@@ -168,7 +168,7 @@ RESTART = {
     "telemetry.send_high_water": f"{DEVICE}[telemetry]\nsend_high_water = 500\n",
     "control.tcp": f"{DEVICE}[control]\ntcp = 'tcp://127.0.0.1:9870'\n",
     "remote.law": f"{DEVICE}[remote]\nlaw = 'tdpa'\n",
-    "remote.params": f"{DEVICE}[remote.params]\nwindow = 3\n",
+    "remote.params": f"{DEVICE}[remote.params]\nbase_s = 0.01\n",
     "remote.scene_tcp": f"{DEVICE}[remote]\nscene_tcp = 'tcp://127.0.0.1:9868'\n",
     "remote.state_tcp": f"{DEVICE}[remote]\nstate_tcp = 'tcp://127.0.0.1:9869'\n",
 }

@@ -128,7 +128,7 @@ def test_a_switch_that_is_refused_leaves_law_scene_and_limits_as_they_were(bench
 def test_what_means_the_same_goes_on_with_what_the_law_has_learnt(bench: Bench) -> None:
     """A default that is now written out is no other law."""
     law = bench.tick.contacts[0].law
-    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nbrake_ratio = 0.6\n"))) == ""
+    assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nbrake_ratio = 0.7\n"))) == ""
     assert bench.tick.contacts[0].law is law
     assert bench.ask(**switch_request(START, configured(WALLS + "[controller.params]\nbrake_ratio = 0.5\n"))) == ""
     assert bench.tick.contacts[0].law is not law

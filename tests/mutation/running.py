@@ -22,6 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
+from threading import Lock
 
 from tests.mutation.harmless import HARMLESS
 from tests.mutation.order import Experience
@@ -101,13 +102,16 @@ def judge(
         for each in trees:
             free.put((each, stack.enter_context(Warm(each, room.asked))))
 
+        parsing = Lock()  # Python 3.11 counts the depth of all threads' syntax trees in one number
+
         def survives(slip: Slip) -> bool:
             mine, warm = free.get()
             file = mine / slip.file
             source, stamp = file.read_text(), file.stat()
             try:
-                file.write_text(slip.into(source))
-                lines = {(slip.file, line) for line in slip.lines(source)}
+                with parsing:
+                    slipped, lines = slip.into(source), {(slip.file, line) for line in slip.lines(source)}
+                file.write_text(slipped)
                 tests = known.order(lines)
                 task = Task(known.limits_s(tests), limit_s, swapped=(slip.file, source))
                 told: Told | None = Told(unfit=bool(tests))

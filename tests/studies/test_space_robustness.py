@@ -60,7 +60,7 @@ def test_the_configuration_of_a_case_is_what_was_judged(capsys: pytest.CaptureFi
 
 
 def test_a_press_on_a_plane_shakes_without_a_law_and_rests_under_one() -> None:
-    case = draw(1, ROUND)
+    case = draw(1, 2 * ROUND)
     assert (case.surface.kind, case.hand) == ("plane", "press")
     found = {law.label: judged(case, law, Criterion())[0] for law in (NONE, RING)}
     assert found == {"none": Verdict.UNSTEADY, "ring-damping": Verdict.STEADY}

@@ -146,7 +146,7 @@ def test_the_default_law_holds_a_stiff_wall_that_shakes_without_one(double: HidD
         assert rest.swing_m < STILL_M
         assert rest.mean_m == pytest.approx(-PRESS_N / STIFF_N_PER_M, abs=5e-5)
     else:
-        assert rest.swing_m > 1e-3
+        assert rest.swing_m > 5.0 * STILL_M
 
 
 def calmest_pressed(double: HidDouble, law: str, still: bool) -> Rest:
