@@ -69,7 +69,7 @@ def test_every_record_fits_its_slot_and_slots_keep_words_aligned(axes: int, orie
     assert all(layout.struct(count).size <= layout.size for count in range(MAX_WALLS + 1))
     assert layout.size % 8 == 0
     objects = 4 + 8 * 23 if axes == 3 else 0
-    ports = 4 + 24 * (8 + 3 * axes)
+    ports = 4 + 24 * (9 + 3 * axes)
     assert layout.size == 8 * (15 + 4 * axes + 9 * orientation + 9 * MAX_WALLS + objects + ports)
 
 
