@@ -40,18 +40,18 @@ radius_m = 0.03
 position_m = [0.0, 0.0, -0.05]
 stiffness_n_per_m = 1000.0
 remote = true
-hold_s = 0.5
+hold_s = 2.0
 
 [[scene.couplings]]
 name = "tool"
 stiffness_n_per_m = 300.0
 max_force_n = 6.0
-hold_s = 0.5
+hold_s = 2.0
 
 [[scene.forces]]
 name = "field"
 max_force_n = 3.0
-hold_s = 0.5
+hold_s = 2.0
 unchanged_s = 0.0
 """
 
@@ -96,7 +96,7 @@ def test_an_experiment_learns_from_which_tick_on_a_change_holds() -> None:
         assert stiffness[0] == before_n_per_m > stiffness[1], "it goes by a ramp, which begins in that tick"
     fading = [one for seq in range(last, end) for one in told[seq] if one["remote"] == FIELD and one["remote_seq"] < 0]
     assert any(any(one["force_n"]) for one in fading)
-    assert [one["remote"] for one in told[end]] == [BALL, TOOL]
+    assert FIELD not in {one["remote"] for one in told[end]}
 
 
 def drive(ball: RemotePort, tool: RemotePort, field: RemotePort) -> int:
