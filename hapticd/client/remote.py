@@ -329,5 +329,5 @@ def _numbers(key: str, value: Any) -> list[float] | float:
 
 
 def _known(kind: type[Any], fields: dict[str, Any]) -> dict[str, Any]:
-    """What this client knows of what it is told; a newer daemon may tell more."""
+    """The keys that this client knows; a newer daemon may send more."""
     return {key: value for key, value in fields.items() if key in kind.__dataclass_fields__}

@@ -11,7 +11,7 @@ MOST = 64
 
 
 def scene(count: int) -> str:
-    """A scene of so many balls."""
+    """A scene of some number of balls."""
     ball = '[[scene.objects]]\nname = "ball {}"\nshape = "sphere"\nradius_m = 0.01\nstiffness_n_per_m = 1000.0\n'
     return '[device.options]\nmodel = "omega7"\naxes = 3\n' + "".join(ball.format(at) for at in range(count))
 

@@ -61,7 +61,7 @@ class Port:
 
 
 def rests_m(law: Any, stiffness_n_per_m: float, late: int) -> float:
-    """How far a device of 0.3 kg and 5 N s/m swings in the end on a spring that comes so many ticks late, as forces."""
+    """The last swing of a device of 0.3 kg and 5 N s/m on a spring whose force comes some ticks late [m]."""
     port = Port(law)
     heard = deque([0.0] * late, maxlen=late)
     x_m = v_m_per_s = 0.0

@@ -20,7 +20,7 @@ NODES = 17
 
 ENOUGH_PASSES = 40
 GOOD_ERROR = 1.0
-"""A measurement is done with so many half turns, and with nodes that are known this well [counts]."""
+"""Half turns that a measurement needs, and the largest error of a node that it may leave [counts]."""
 
 _NEAR = 64  # counts to either side that speak for a node
 _MOST_UNEVEN = 1.6  # between the times that neighbouring half turns take

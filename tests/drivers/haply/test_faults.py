@@ -73,7 +73,7 @@ class Trouble:
         name: what goes wrong.
         happen: brings it about.
         kind, text: the error, and what is in its text.
-        most_ticks: until it is told.
+        most_ticks: the fault is reported within this many ticks.
         peak_n: largest force that the service is asked for from then on [N].
         tick_s: what a tick waits for a state [s]; long, so that a busy computer is none of it.
     """

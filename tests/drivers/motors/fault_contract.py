@@ -35,7 +35,7 @@ class MotorFault:
         name: in the table of the family's page.
         happen: brings it about.
         kind, text: the error, and what is in its text.
-        most_ticks: until it is told.
+        most_ticks: the fault is reported within this many ticks.
         tick_s: what a tick waits for a state [s].
     """
 

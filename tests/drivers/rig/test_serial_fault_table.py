@@ -29,7 +29,7 @@ class Trouble:
         name: what goes wrong.
         happen: brings it about.
         kind, text: the error, and what is in its text.
-        most_ticks: until it is told.
+        most_ticks: the fault is reported within this many ticks.
         peak_n: largest force from then on [N].
     """
 
