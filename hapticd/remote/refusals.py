@@ -1,7 +1,7 @@
 """What clients are told of what was refused: the first at once, and then the last of each second.
 
-A refusal within a second of one that was told waits until that second is over. So every client hears what is wrong, and a
-client that keeps making mistakes gets one answer a second.
+A refusal within a second of one that was told waits until that second is over. So every client hears what is wrong,
+and one that keeps making mistakes gets one answer a second.
 """
 
 from __future__ import annotations
