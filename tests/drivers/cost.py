@@ -184,6 +184,6 @@ if __name__ == "__main__":
             try:
                 said = row(each, measure(each, int(sys.argv[1]) if len(sys.argv) > 1 else 4000))
                 break
-            except (AssertionError, pytest.skip.Exception) as error:
+            except (AssertionError, pytest.skip.Exception) as error:  # a build skips where it has no compiler
                 said = f"| {each} | {error} |"
-        print(said, flush=True)  # noqa: T201 - its output
+        print(said, flush=True)  # noqa: T201 - the table is what the program is for
