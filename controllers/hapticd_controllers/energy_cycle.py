@@ -12,7 +12,8 @@ from typing import Any, Literal
 from pydantic import Field
 
 from hapticd.law import LawParams
-from hapticd.tick.energy import CycleFields, cycle_ended
+from hapticd.tick.energy import cycle_ended
+from hapticd_controllers.cycle_sums import CycleSums, begin, end
 from hapticd_controllers.felt_mass import FELT_SAMPLES, FeltFields, believe, feel, know_nothing
 
 LEARNED = ("damping_n_s_per_m",)
@@ -98,17 +99,10 @@ class Params(LawParams):
     wall_may_pull: bool = Field(True, description="whether damping may pull the device back while it leaves the wall")
 
 
-class State(CycleFields, FeltFields):
+class State(CycleSums, FeltFields):
     """What is remembered of one wall: cycle detector, energy, damping, and the evidence for mass and delay."""
 
     damping_n_s_per_m: float  # alpha, in force until the next cycle ends
-    energy_j: float  # into the wall since the end of the last cycle
-    motion_m2_per_s: float  # sum of v^2 dt in contact
-    candidate_motion_m2_per_s: float  # the same at the detector's candidate
-    candidate_stored_j: float  # what the spring held at the candidate
-    stored_j: float  # what the spring held at the end of the last cycle
-    lowest_m: float  # deepest position since the end of the last cycle
-    highest_m: float  # highest position in contact since then
     was_in_contact: bool
     period_s: float  # dt, smoothed: one overrun is not another sampling rate
     last_work_n: float  # the force that went into the energy, one sample ago
@@ -121,7 +115,7 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.was_in_contact = False
     state.lowest_m = snapshot.x_m
     state.highest_m = snapshot.x_m
-    _begin(state, min(0.0, -_bounded(snapshot.debt_j)))
+    begin(state, min(0.0, -_bounded(snapshot.debt_j)))
     state.period_s = 0.0
     state.last_work_n = 0.0
 
@@ -131,7 +125,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
     if params.cap == CAP_FELT_MASS or params.force_delay == FORCE_DELAY_IDENTIFIED:
         feel(state, tick, params.felt_mass_memory)
     if tick.in_contact and not state.was_in_contact and params.new_contact != NEW_CONTACT_KEEP:
-        _begin(state, 0.0)
+        begin(state, 0.0)
         if params.new_contact == NEW_CONTACT_DAMPING:
             state.damping_n_s_per_m = 0.0
     state.was_in_contact = tick.in_contact
@@ -207,15 +201,10 @@ def _end_cycle(state: Any, params: Any, tick: Any) -> None:
         state.damping_n_s_per_m += change
         if state.damping_n_s_per_m < 0.0 and params.rule == RULE_NON_NEGATIVE:
             state.damping_n_s_per_m = 0.0
-    state.energy_j -= state.window_minimum_j
-    state.window_energy_j -= state.window_minimum_j
-    state.window_minimum_j = 0.0
-    state.stored_j = state.candidate_stored_j
+    end(state, tick.x_m)
     if params.sum == SUM_CYCLE:
         state.motion_m2_per_s -= motion
         state.candidate_motion_m2_per_s = 0.0
-    state.lowest_m = tick.x_m
-    state.highest_m = tick.x_m
 
 
 def _cap(state: Any, params: Any, tick: Any) -> float:
@@ -232,19 +221,6 @@ def _cap(state: Any, params: Any, tick: Any) -> float:
             share = params.late_cap_share if state.forces_late else params.cap_share
             cap = share * mass_kg / state.period_s
     return cap
-
-
-def _begin(state: Any, energy_j: float) -> None:
-    """Count energy and motion from here."""
-    state.energy_j = energy_j
-    state.window_energy_j = energy_j
-    state.window_minimum_j = 0.0
-    state.window_falls = 0
-    state.window_rises = 0
-    state.motion_m2_per_s = 0.0
-    state.candidate_motion_m2_per_s = 0.0
-    state.candidate_stored_j = 0.0
-    state.stored_j = 0.0
 
 
 def _bounded(value: float) -> float:

@@ -17,7 +17,8 @@ from __future__ import annotations
 from typing import Any
 
 from hapticd.law import Field, LawParams
-from hapticd.tick.energy import CycleFields, cycle_ended
+from hapticd.tick.energy import cycle_ended
+from hapticd_controllers.cycle_sums import CycleSums, begin, end
 from hapticd_controllers.felt_mass import FELT_SAMPLES, FeltFields, believe, feel, know_nothing
 
 LEARNED = ("damping_n_s_per_m",)
@@ -50,18 +51,11 @@ class Params(LawParams):
     )
 
 
-class State(CycleFields, FeltFields):
+class State(CycleSums, FeltFields):
     """What is remembered of one axis of a port."""
 
     damping_n_s_per_m: float  # in force until the next cycle ends
     velocity_m_per_s: float  # smoothed
-    energy_j: float  # into the port since the end of the last cycle
-    motion_m2_per_s: float  # sum of v^2 dt since then
-    candidate_motion_m2_per_s: float  # the same at the detector's candidate
-    candidate_stored_j: float  # what the spring held at the candidate
-    stored_j: float  # what it held at the end of the last cycle
-    lowest_m: float  # how far the cycle has travelled, as seen from the target
-    highest_m: float
     was_in_contact: bool
     period_s: float  # dt, smoothed: one overrun is not another sampling rate
     last_port_n: float  # the port's own force, one sample ago
@@ -73,7 +67,9 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.velocity_m_per_s = 0.0
     know_nothing(state, False)
     state.was_in_contact = False
-    _begin(state, snapshot.x_m, min(0.0, -_bounded(snapshot.debt_j)))
+    begin(state, min(0.0, -_bounded(snapshot.debt_j)))
+    state.lowest_m = snapshot.x_m
+    state.highest_m = snapshot.x_m
     state.period_s = 0.0
     state.last_port_n = 0.0
 
@@ -82,7 +78,9 @@ def step(state: Any, params: Any, tick: Any) -> float:
     """The port's own force, less damping.  -> force on the device [N]."""
     feel(state, tick, MEMORY)
     if tick.in_contact and not state.was_in_contact and tick.spring_n != 0.0:
-        _begin(state, tick.x_m, 0.0)
+        begin(state, 0.0)
+        state.lowest_m = tick.x_m
+        state.highest_m = tick.x_m
         state.damping_n_s_per_m = 0.0
     state.was_in_contact = tick.in_contact
 
@@ -102,21 +100,6 @@ def step(state: Any, params: Any, tick: Any) -> float:
     state.velocity_m_per_s += NEW_SPEED * (tick.velocity_m_per_s - state.velocity_m_per_s)
     force_n: float = tick.contact_n - state.damping_n_s_per_m * state.velocity_m_per_s
     return force_n
-
-
-def _begin(state: Any, x_m: float, energy_j: float) -> None:
-    """Count energy and motion from here."""
-    state.energy_j = energy_j
-    state.window_energy_j = energy_j
-    state.window_minimum_j = 0.0
-    state.window_falls = 0
-    state.window_rises = 0
-    state.motion_m2_per_s = 0.0
-    state.candidate_motion_m2_per_s = 0.0
-    state.candidate_stored_j = 0.0
-    state.stored_j = 0.0
-    state.lowest_m = x_m
-    state.highest_m = x_m
 
 
 def _count_energy(state: Any, tick: Any) -> None:
@@ -142,14 +125,9 @@ def _end_cycle(state: Any, params: Any, tick: Any) -> None:
             state.damping_n_s_per_m += missing
         else:
             state.damping_n_s_per_m *= 1.0 - params.fall
-    state.energy_j -= state.window_minimum_j
-    state.window_energy_j -= state.window_minimum_j
-    state.window_minimum_j = 0.0
-    state.stored_j = state.candidate_stored_j
+    end(state, tick.x_m)
     state.motion_m2_per_s -= motion
     state.candidate_motion_m2_per_s = 0.0
-    state.lowest_m = tick.x_m
-    state.highest_m = tick.x_m
 
 
 def _bound(state: Any, params: Any, tick: Any) -> None:

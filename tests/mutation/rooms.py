@@ -88,7 +88,10 @@ ROOMS = {
         ),
     ),
     **{name: _law(name) for name in LAWS},
-    "felt_mass": Room(("controllers/hapticd_controllers/felt_mass.py",), ("tests/controllers/test_energy_cycle.py",)),
+    **{
+        name: Room((f"controllers/hapticd_controllers/{name}.py",), ("tests/controllers/test_energy_cycle.py",))
+        for name in ("cycle_sums", "felt_mass")
+    },
     "recovery": Room(
         ("hapticd/supervisor/recovery.py", "hapticd/loop/resume.py"),
         ("tests/daemon/test_recovery.py", "tests/daemon/test_plugged_in.py", "tests/loop/test_leaving.py"),
