@@ -6,7 +6,6 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from hapticd_drivers.haply import driver as haply_driver
 from hapticd_drivers.haply import messages
 from hapticd_drivers.haply.driver import BAD, Inverse3, Inverse3Options
 from tests.drivers.haply.service import FakeService
+from tests.drivers.trouble import Trouble
 from tests.examples import examples
 
 PUSH_N = 1.0
@@ -63,32 +63,6 @@ def ticks_until(driver: Inverse3, kind: type[DriverError], text: str, tick_s: fl
     with pytest.raises(kind, match=text):
         press_on()
     return ticks
-
-
-@dataclass(frozen=True)
-class Trouble:
-    """A line of the table in docs/inverse3.md.
-
-    Attributes:
-        name: what goes wrong.
-        happen: brings it about.
-        kind, text: the error, and what is in its text.
-        most_ticks: the fault is reported within this many ticks.
-        peak_n: largest force that the service is asked for from then on [N].
-        tick_s: what a tick waits for a state [s]; long, so that a busy computer is none of it.
-    """
-
-    name: str
-    happen: Callable[[FakeService], object]
-    kind: type[DriverError]
-    text: str
-    most_ticks: int
-    peak_n: float
-    tick_s: float = 1.0
-
-    def row(self) -> str:
-        """How the page begins the line."""
-        return f"| {self.name} | {self.most_ticks} | {self.peak_n:.2f} |"
 
 
 def unplug(service: FakeService) -> None:

@@ -3,46 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from hapticd.driver import DriverState
-from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DeviceTimeoutError, DriverError
+from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DeviceTimeoutError
 from hapticd_drivers.rig import conversation
 from hapticd_drivers.rig.serial_rig import SerialRig
 from tests.drivers.rig.device import Rig
 from tests.drivers.rig.ticking import tick
+from tests.drivers.trouble import Trouble
 
 PUSH_N = 1.0
 SILENCE_MS = 20
 STALL_US = 24_000
 PAGE = Path(__file__).parents[3] / "docs" / "serial-rig.md"
-
-
-@dataclass(frozen=True)
-class Trouble:
-    """A line of the table.
-
-    Attributes:
-        name: what goes wrong.
-        happen: brings it about.
-        kind, text: the error, and what is in its text.
-        most_ticks: the fault is reported within this many ticks.
-        peak_n: largest force from then on [N].
-    """
-
-    name: str
-    happen: Callable[[Rig], object]
-    kind: type[DriverError]
-    text: str
-    most_ticks: int
-    peak_n: float
-
-    def row(self) -> str:
-        """How the page begins the line."""
-        return f"| {self.name} | {self.most_ticks} | {self.peak_n:.2f} |"
 
 
 def fall_silent(rig: Rig) -> None:
