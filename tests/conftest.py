@@ -18,6 +18,9 @@ from tests import repeating
 from tests.examples import TIMES, examples
 from tests.longest import LONGEST, ROOT, rank
 
+OWN_PACKAGES = ("lab", "mylab")
+"""What tests call the packages of a laboratory's own."""
+
 IN_CI = os.environ.get("CI") == "true"
 
 # On a busy machine any example may be slow. The rest stays Hypothesis's own: in CI the same examples every time, but
@@ -65,6 +68,14 @@ def busy() -> Generator[None, None, None]:
     """Where tests are repeated they run beside a busy processor."""
     with repeating.busy_processor() if repeating.REPEAT > 1 else contextlib.nullcontext():
         yield
+
+
+@pytest.fixture(autouse=True)
+def own_packages() -> Generator[None, None, None]:
+    """Forget the packages of a laboratory's own that a test has made, so that the next test finds none of that name."""
+    yield
+    for name in [name for name in sys.modules if name.partition(".")[0] in OWN_PACKAGES]:
+        del sys.modules[name]
 
 
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:

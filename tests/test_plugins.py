@@ -38,8 +38,6 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab" / "__init__.py").write_text("")
     monkeypatch.syspath_prepend(tmp_path)
-    for name in ("lab", "lab.law", "lab.rig"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
     return tmp_path / "lab"
 
 
