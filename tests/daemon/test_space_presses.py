@@ -7,7 +7,7 @@ same presses without a law move on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -54,6 +54,10 @@ def test_the_default_law_steadies_the_ball_the_edge_and_the_plane(law: str | Non
 @pytest.mark.parametrize("law", [None, "none"])
 @pytest.mark.parametrize("stiffness", STIFFNESSES)
 @pytest.mark.parametrize("kind", KINDS)
-def test_from_sixty_starts_and_directions(kind: str, stiffness: float, law: str | None) -> None:
+def test_from_sixty_starts_and_directions(
+    kind: str, stiffness: float, law: str | None, record_property: Callable[[str, object], None]
+) -> None:
     spans = spans_m(stiffness, law, [kind], STARTS)
+    least_um, most_um = min(spans) * 1e6, max(spans) * 1e6
+    record_property("prints", f"{kind}, {stiffness:.0f} N/m, {law or 'default'}: {least_um:.1f} to {most_um:.1f} um")
     assert [span < STILL_M for span in spans] == [law is None] * STARTS, spans
