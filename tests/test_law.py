@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+import pytest
+
 import hapticd.driver
 import hapticd.law
-from hapticd.law import LawSnapshot, LawTick, fresh_state
+from hapticd.errors import PluginError
+from hapticd.law import LawParams, LawSnapshot, LawTick, fresh_state, scalar_params
 from hapticd_controllers import tdpa
 
 
@@ -32,6 +37,29 @@ def test_a_state_shows_its_fields() -> None:
     state = fresh_state(tdpa)
     state.energy_j = -0.25
     assert repr(state).startswith("hapticd_controllers.tdpa.State(energy_j=-0.25, ")
+
+
+def test_parameters_arrive_as_numbers_and_a_choice_as_its_place() -> None:
+    class Params(LawParams):
+        gain: float = 2.5
+        samples: int = 3
+        signed: bool = True
+        rule: Literal["last", "sum", None] = "sum"
+
+    assert scalar_params(Params()) == {"gain": 2.5, "samples": 3, "signed": True, "rule": 1}
+    assert scalar_params(Params(rule=None))["rule"] == 2
+
+
+@pytest.mark.parametrize("value", [None, "x", (1.0, 2.0)])
+def test_a_parameter_that_is_no_number_and_no_choice_is_refused_by_its_name(value: object) -> None:
+    """C14: it was said that None arrives as -1, which a law would have taken for a number."""
+
+    class Params(LawParams):
+        cap: object = value
+
+    with pytest.raises(PluginError, match=r"parameter cap = .*: a law takes numbers, bools and choices only"):
+        scalar_params(Params())
+    assert "None" not in str(scalar_params.__doc__)
 
 
 def test_one_import_is_enough_to_write_a_law_and_one_to_write_a_driver() -> None:

@@ -20,7 +20,7 @@ from hapticd.config.problems import Problems, nearest
 from hapticd.config.values import with_values
 from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import ConfigError, PluginError
-from hapticd.law import LawParams
+from hapticd.law import LawParams, scalar_params
 from hapticd.settings import Table
 
 PluginT = TypeVar("PluginT")
@@ -169,7 +169,14 @@ def _law(
     if not isinstance(params, dict):  # already reported
         return law, None
     model: type[LawParams] = law.Params
-    return law, _checked(problems, model, params, (table, "params"))
+    checked = _checked(problems, model, params, (table, "params"))
+    if checked is not None:
+        try:
+            scalar_params(checked)  # here, and not when the scene gets its first wall
+        except PluginError as error:
+            problems.add((table, "params"), str(error))
+            return law, None
+    return law, checked
 
 
 def _checked(problems: Problems, model: type[TableT], data: object, at: tuple[str, str]) -> TableT | None:

@@ -150,6 +150,18 @@ def test_a_plugin_whose_own_check_crashes_is_a_problem_of_that_table(monkeypatch
     assert problem == "lab.toml: controller.params: cannot be checked: KeyError: 'gain\\n2.0'"
 
 
+def test_a_parameter_that_no_law_can_be_given_is_a_problem_of_that_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With no wall in the scene as well: the first wall would come later, by a reload."""
+
+    class Params(LawParams):
+        cap: float | None = None
+
+    monkeypatch.setattr(parse("[controller]\nlaw = 'none'", "x").law, "Params", Params)
+    (problem,) = problems("[controller]\nlaw = 'none'")
+    assert problem.startswith("lab.toml: controller.params: parameter cap = None: a law takes numbers")
+    assert parse("[controller]\nlaw = 'none'\nparams = { cap = 2.0 }", "x").params == Params(cap=2.0)
+
+
 def test_an_unknown_profile_lists_the_known_ones() -> None:
     (problem,) = problems("[device.options.hand]\nforce = { profile = 'press' }")
     assert problem.startswith('lab.toml: device.options.hand.force.profile = "press": must be one of "constant", ')

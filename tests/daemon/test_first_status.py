@@ -1,0 +1,82 @@
+"""What the status says of a device before the first record of a loop, and after each kind of record."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import pytest
+
+from hapticd.config.loading import parse
+from hapticd.device import DeviceInfo
+from hapticd.loop.memory import SharedMemory
+from hapticd.loop.resume import FROM_START
+from hapticd.supervisor.child import LoopProcess
+from hapticd.supervisor.recovery import Recovery
+from hapticd.supervisor.status import StatusBuilder
+from hapticd.telemetry.records import Status
+from hapticd.tick.flags import Flag
+from hapticd.tick.record import RecordLayout, TickRecord
+
+CONFIG = parse("", "lab.toml")
+INFO = DeviceInfo(
+    model="rig",
+    serial="1",
+    axes=("x",),
+    max_force_n=3.0,
+    resolution_m=1e-5,
+    workspace_m=((-0.1, 0.1),),
+    nominal_rate_hz=1000.0,
+    safe_damping_n_s_per_m=5.0,
+    host_silence_ms=50.0,
+)
+
+
+@pytest.fixture
+def loop() -> Iterator[LoopProcess]:
+    """A process that has said what a loop says when it is ready, and has not ticked."""
+    shared = SharedMemory(RecordLayout(1, False, 8), 1000.0)
+    hello = {"info": asdict(INFO), "realtime": True, "warnings": [], "accuracy": ""}
+    with subprocess.Popen(["sleep", "60"]) as process:
+        loop = LoopProcess(process, hello, os.dup(shared.descriptor), CONFIG)
+        yield loop
+        process.kill()
+    loop.close()
+    shared.close()
+
+
+def record(flags: Flag) -> TickRecord:
+    zero = (0.0,)
+    return TickRecord(0, 0, 0.0, 0.0, 1e-3, 0, flags, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, zero, zero, zero, zero, (), ())
+
+
+def made(status: StatusBuilder, loop: LoopProcess, recovery: Recovery) -> Status:
+    return status.make(CONFIG, loop, recovery, 0, 0, "", {})
+
+
+def test_a_device_is_calibrated_once_a_record_says_so_and_not_before(loop: LoopProcess) -> None:
+    """T12: before the first record, a rig that did not know where it was was said to be calibrated."""
+    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery()
+    assert not made(status, loop, recovery).calibrated
+    status.add([record(Flag.UNCALIBRATED)])
+    assert not made(status, loop, recovery).calibrated
+    status.add([record(Flag(0))])
+    assert made(status, loop, recovery).calibrated
+    status.expect(FROM_START)
+    assert not made(status, loop, recovery).calibrated, "of the loop that comes next nothing is known"
+
+
+def test_a_device_that_is_lost_is_not_calibrated_until_the_next_loop_says_so(loop: LoopProcess) -> None:
+    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery()
+    status.add([record(Flag.ARMED)])
+    assert made(status, loop, recovery).armed
+    recovery.lost, recovery.resume = True, replace(FROM_START, latched=True, law=3)
+    lost = made(status, loop, recovery)
+    assert (lost.calibrated, lost.armed, lost.latched, lost.law_index) == (False, False, True, 3)
+    recovery.lost = False
+    status.add([record(Flag(0))])
+    found = made(status, loop, recovery)
+    assert (found.calibrated, found.latched, found.law_index) == (True, False, 0)
