@@ -6,6 +6,7 @@ same presses without a law move on.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,7 +23,7 @@ TOP = Path(__file__).parents[2]
 
 
 def spans_m(stiffness: float, law: str | None, kinds: Sequence[str], starts: int) -> list[float]:
-    """How far the device moves in the last half second of each press, as the daemon's telemetry has it."""
+    """How far apart the device was in the last half second of each press, as the daemon's telemetry has it."""
     presses = starts * len(kinds)
     seen: list[list[list[float]]] = [[] for _ in range(presses)]
     pushed = [False] * presses
@@ -39,7 +40,12 @@ def spans_m(stiffness: float, law: str | None, kinds: Sequence[str], starts: int
                 pushed[press] = pushed[press] or any(fields["force_n"])
     assert all(pushed), "the daemon has let the force out"  # as it does where its supervisor stalls for 10 s
     assert all(len(one) > 0.9 * JUDGED for one in seen)  # a busy machine may lose some
-    return [math.hypot(*(max(axis) - min(axis) for axis in zip(*one, strict=True))) for one in seen]
+    return [_farthest_m(one) for one in seen]
+
+
+def _farthest_m(places: Sequence[Sequence[float]]) -> float:
+    """Between any two of them: a box along the device's axes would be longer as the device is mounted another way."""
+    return max(itertools.starmap(math.dist, itertools.combinations({tuple(at) for at in places}, 2)), default=0.0)
 
 
 @pytest.mark.parametrize("law", [None, "none"])
