@@ -35,6 +35,7 @@ BOUNCE = 0.5  # a whole bounce without a turn that is seen goes in and out: two 
 EVEN = 0.3  # half periods within three tenths are equal; quantised turns are blurred by as much
 EVEN_TICKS = 1.5  # and never known better than to a tick at each end
 QUARTER = 4.0 / PI  # ratio of k t to the full brake, a quarter of a period after the touch: 2 / w over (pi / 2) / w
+RECENT = 8.0  # an arrival is braked by its mean speed over the last of 8 parts of its time: a single count is no blow
 SHRINKS = 0.95  # a swing below this share of the one two before (same direction) dies away by itself
 MANY = 4.0  # cut swings without a pause: a device that bounces slowly, and not a hand that taps
 OWN = 2.5  # a swing that would need more than this many times the known mass is driven from outside
@@ -54,6 +55,7 @@ EVIDENCE = 0.3  # that a swing of one turn threshold did not shrink; of counts, 
 ENOUGH = 1.2  # of it in a row before the base grows: two large swings, or four of two counts
 UNEVEN = 3.0  # in turn thresholds: swings as long as this are no noise, even or not
 ARRIVAL = 6.0  # swings of a contact before its base may grow: an arrival has died away by then
+SOFTENS = 0.5  # of the stiffness, from tick to tick: another wall, at which the device arrives now
 SLOWER = 0.9  # of the base, for each swing of a hand: this wall is being used and does not ring
 LEFT = 0.5  # of the base, for each time the device has left for good
 MOST_LEAKS = 1e3
@@ -75,7 +77,7 @@ class Params(LawParams):
         "sooner, low leaves taps and presses as they are",
     )
     pull_after: int = Field(
-        2, ge=0, le=1000, description="swings that did not shrink before damping may pull the device back; 0: always"
+        4, ge=0, le=1000, description="swings that did not shrink before damping may pull the device back; 0: always"
     )
 
 
@@ -99,6 +101,7 @@ class State:
     outward: bool  # direction of the swing that runs
     whole: bool  # whether it began with a turn, and not at the surface
     arrives: bool  # whether it is the way in from the surface, and nothing rings yet
+    comes_m_per_s: float  # its mean speed then, over the last eighth of that time
     from_m: float  # where it began
     far_m: float  # how far it has come
     far_s: float  # when, from its beginning
@@ -124,6 +127,7 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.steady = 0.0
     state.noise_m = 0.0
     state.last_moved_m = 0.0
+    state.comes_m_per_s = 0.0
     state.was_in_contact = snapshot.x_m < 0.0
     _begin(state, min(0.0, snapshot.x_m), snapshot.velocity_m_per_s > 0.0, False)
     state.last_s = 0.0
@@ -137,7 +141,8 @@ def step(state: Any, params: Any, tick: Any) -> float:
     turn_m = _turn_threshold(state, tick)
     state.swing_s += tick.dt_s
     stiffness = 0.0
-    if tick.in_contact:
+    inside = tick.in_contact
+    if inside:
         stiffness = tick.spring_n / -tick.x_m
         if stiffness > LIMIT:
             stiffness = LIMIT
@@ -151,12 +156,15 @@ def step(state: Any, params: Any, tick: Any) -> float:
         _follow(state, params, tick, turn_m, stiffness)
     elif state.was_in_contact:
         _leave(state, params, tick, turn_m)
-    state.was_in_contact = tick.in_contact
-    _listen(state, params, tick.in_contact)
-    if not tick.in_contact:
+    state.was_in_contact = inside
+    if state.last_s > 0.0 and state.swing_s > (SILENCE * state.last_s if inside else FLIGHT_S):
+        _fall_silent(state, params, inside)
+    if not inside:
         return 0.0
     _set_damping(state, params, stiffness, tick.dt_s)
     force_n: float = tick.contact_n - state.damping_n_s_per_m * tick.velocity_m_per_s  # eq. 9
+    if state.arrives:
+        force_n += _evenly(state, tick)
     if force_n < 0.0 and state.stubborn < params.pull_after:
         force_n = max(force_n, min(0.0, tick.contact_n))  # a wall does not hold on to who leaves
     return force_n
@@ -303,10 +311,8 @@ def _relax(state: Any, share: float) -> None:
     state.leaks = max(1.0, share * leaks)
 
 
-def _listen(state: Any, params: Any, in_contact: bool) -> None:
+def _fall_silent(state: Any, params: Any, in_contact: bool) -> None:
     """Silence ends the ring, and with it the brake; the next ring begins with less if this one was harmless."""
-    if state.last_s == 0.0 or state.swing_s <= (SILENCE * state.last_s if in_contact else FLIGHT_S):
-        return
     if in_contact and state.brake == 0.0 and state.swings == 0.0:
         return
     state.brake = 0.0
@@ -338,10 +344,11 @@ def _inherit(state: Any, stiffness: float, dt_s: float) -> None:
 def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None:
     """Base and brake at the stiffness of now, so that both soften with the wall."""
     leak = 0.5 * stiffness * dt_s
+    if leak < SOFTENS * state.leak_n_s_per_m:
+        state.age = 0.0
     base = leak * state.leaks
-    mass_kg = state.felt_mass_kg
-    if state.leaks > 1.0 and mass_kg > 0.0:
-        base = max(leak, min(base, BASE_OF_MASS * mass_kg / dt_s))
+    if state.leaks > 1.0 and state.felt_mass_kg > 0.0:
+        base = max(leak, min(base, BASE_OF_MASS * state.felt_mass_kg / dt_s))
     state.leak_n_s_per_m = leak
     state.base_n_s_per_m = base
     damping = base
@@ -349,10 +356,19 @@ def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None
         damping = _bounded(base + _full(state, state.brake, stiffness, dt_s))
     elif state.arrives and state.swing_s <= params.hand_half_period_s:
         brake = QUARTER * state.first_brake * stiffness * state.swing_s
-        if mass_kg > 0.0:
+        if state.felt_mass_kg > 0.0:
             brake = min(brake, _full(state, state.first_brake, stiffness, dt_s))
         damping = _bounded(base + brake)
     state.damping_n_s_per_m = damping
+
+
+def _evenly(state: Any, tick: Any) -> float:
+    """What the brake gives more on an arrival for its mean speed than for that of this tick, 0 or a few counts."""
+    share = RECENT * tick.dt_s / max(RECENT * tick.dt_s, state.swing_s)
+    state.comes_m_per_s += share * (tick.velocity_m_per_s - state.comes_m_per_s)
+    brake = state.damping_n_s_per_m - state.base_n_s_per_m
+    more_n: float = brake * (tick.velocity_m_per_s - state.comes_m_per_s)
+    return more_n
 
 
 def _full(state: Any, ratio: float, stiffness: float, dt_s: float) -> float:

@@ -260,7 +260,7 @@ def test_config_show_fills_in_the_defaults() -> None:
     shown = tomllib.loads(hapticd("config", "show", GOOD).stdout)
     assert shown["safety"]["ramp_s"] == 0.05
     assert shown["device"]["options"]["mass_kg"] == 0.25
-    assert shown["controller"]["params"]["pull_after"] == 2
+    assert shown["controller"]["params"]["pull_after"] == 4
 
 
 def test_config_show_of_a_bad_file_prints_its_problems(bad: Path) -> None:
