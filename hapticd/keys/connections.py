@@ -1,19 +1,22 @@
-"""How many may be connected: a bound that ZeroMQ itself does not have.
+"""How many may be connected, and what they may fill: bounds that ZeroMQ itself does not have.
 
 Each connection costs a descriptor, and ZeroMQ aborts the process that has none left when the next client of a local
 socket comes. ZeroMQ tells of each connection that it has taken, and takes no more while a thousand or two of those
-messages are unread, so that a thread that stands still lets nothing grow.
+messages are unread, so that a thread that stands still lets nothing grow. A message of endless frames is seen by the
+memory that it takes, and its connection ended.
 """
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import logging
 import os
 import resource
 import select
 import socket as sockets
 import struct
+import termios
 import threading
 import time
 from collections.abc import Iterator
@@ -21,6 +24,8 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 import zmq
+
+from hapticd.keys.memory import Culprits, MemoryBound
 
 MOST_CONNECTIONS = 256
 """How many clients an endpoint has at most; beyond it those that have said nothing yet are dropped, oldest first."""
@@ -33,7 +38,8 @@ MOST_ODD = 32
 
 _UNREAD = 1000
 _QUIET_S = 60.0  # between two lines in the log about the same endpoint
-_LOOK_MS = 1000
+_LOOK_MS = 50
+_SENDING_S = 0.02  # in this time who sends without a pause is seen to have sent
 _NEWS = zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED | zmq.EVENT_CLOSED | zmq.EVENT_MONITOR_STOPPED
 _MONITOR = "inproc://connections"
 _CREDENTIALS = "iII"
@@ -68,13 +74,18 @@ class ConnectionBound:
     Args:
         socket: that clients connect to, one of it in a ZeroMQ context.
         most: connections of an endpoint.
+        keep_heard: a client that has said something is not dropped for one that is newer. Without, the one that has
+            said nothing for the longest time is, so that there is always a way in.
     """
 
-    def __init__(self, socket: zmq.Socket[bytes], most: int = MOST_CONNECTIONS) -> None:
+    def __init__(self, socket: zmq.Socket[bytes], most: int = MOST_CONNECTIONS, *, keep_heard: bool = True) -> None:
         self._most = most
+        self._keep_heard = keep_heard
         self._endpoints: dict[str, dict[int, _Client]] = {}  # by descriptor, oldest first
         self._lock = threading.Lock()
         self._told_s: dict[str, float] = {}
+        self._memory = MemoryBound()
+        self._looked_s = 0.0
         self._closed = threading.Event()
         socket.monitor(_MONITOR, _NEWS)
         self._news: zmq.Socket[bytes] = socket.context.socket(zmq.PAIR)
@@ -84,7 +95,7 @@ class ConnectionBound:
         self._thread.start()
 
     def heard(self, descriptor: int) -> None:
-        """A client has said something that makes sense: it is not dropped for one that is newer.
+        """A client has said something that makes sense: those that have not are dropped before it.
 
         Args:
             descriptor: of its connection, as ZeroMQ tells with a message.
@@ -92,7 +103,7 @@ class ConnectionBound:
         with self._lock:
             for clients in self._endpoints.values():
                 if descriptor in clients:
-                    clients[descriptor].heard = True
+                    clients[descriptor].heard_s = time.monotonic()
 
     def odd(self, descriptor: int) -> bool:
         """A client has said what makes no sense; past `MOST_ODD` of it, it is disconnected.
@@ -122,6 +133,7 @@ class ConnectionBound:
     def _run(self) -> None:
         # Until the socket is closed and all has been read: a thread of ZeroMQ may wait for that.
         while self._news.poll(_LOOK_MS) or not self._closed.is_set():
+            self._look_at_memory()
             if not self._news.poll(0):
                 continue
             news, where = self._news.recv_multipart()
@@ -131,6 +143,24 @@ class ConnectionBound:
             with self._lock:
                 self._learn(event, value, where.decode(errors="replace"))
         self._news.close(0)
+
+    def _look_at_memory(self) -> None:
+        now_s = time.monotonic()
+        if now_s - self._looked_s < 1e-3 * _LOOK_MS:
+            return
+        self._looked_s = now_s
+        culprits = self._memory.turn(now_s)
+        if culprits is Culprits.NO_ONE:
+            return
+        with self._lock:
+            known = [(one, endpoint) for endpoint, clients in self._endpoints.items() for one in clients]
+        ended = _sending(known) if culprits is Culprits.SENDERS else known
+        with self._lock:
+            for descriptor, endpoint in ended:
+                if self._endpoints.get(endpoint, {}).pop(descriptor, None) is not None:
+                    _shut(descriptor, endpoint)
+        for endpoint in {endpoint for _, endpoint in ended}:
+            log.warning("%s: what clients have sent fills the memory; those that send were disconnected", endpoint)
 
     def _learn(self, event: int, descriptor: int, endpoint: str) -> None:
         if event == zmq.EVENT_CLOSED:  # the endpoint itself, and with it all that were connected there
@@ -143,10 +173,16 @@ class ConnectionBound:
         clients = self._endpoints.setdefault(endpoint, {})
         clients[descriptor] = _Client()
         if len(clients) > self._most:
-            victim = next(one for one, client in clients.items() if not client.heard)
+            victim = self._victim(clients)
             del clients[victim]
             _shut(victim, endpoint)
             self._tell(endpoint)
+
+    def _victim(self, clients: dict[int, _Client]) -> int:
+        *before, _newest = clients
+        if self._keep_heard:
+            return next(one for one, client in clients.items() if not client.heard_s)
+        return min(before, key=lambda one: clients[one].heard_s)
 
     def _tell(self, endpoint: str) -> None:
         now_s = time.monotonic()
@@ -157,7 +193,7 @@ class ConnectionBound:
 
 @dataclass(slots=True)
 class _Client:
-    heard: bool = False
+    heard_s: float = 0.0  # when it last said something that makes sense; 0: never
     odd: int = 0
 
 
@@ -195,6 +231,20 @@ def has_ended(descriptor: int, inode: int) -> bool:
     look = select.poll()
     look.register(descriptor, select.POLLRDHUP)
     return bool(look.poll(0))
+
+
+def _sending(known: list[tuple[int, str]]) -> list[tuple[int, str]]:
+    """Those connections on which something comes that has not been read yet."""
+    found: dict[tuple[int, str], None] = {}
+    until_s = time.monotonic() + _SENDING_S
+    while time.monotonic() < until_s:
+        for one in known:
+            with contextlib.suppress(OSError):
+                unread = fcntl.ioctl(one[0], termios.FIONREAD, bytes(4))
+                if any(unread):
+                    found[one] = None
+        time.sleep(1e-3)
+    return list(found)
 
 
 def _enough(limit: int) -> bool:

@@ -87,6 +87,7 @@ class RemoteServer:
         except BaseException:
             self._scene.close()
             raise
+        self._priority.settle()
         self._memory = _Memory(settings, descriptor)
         self._serve(settings)
         self._reported_ns = 0

@@ -19,6 +19,7 @@ import zmq
 
 from hapticd.config.ports import PortLimits
 from hapticd.keys.connections import has_ended, inode_of
+from hapticd.keys.frames import FirstFrame, FrameReader
 from hapticd.keys.store import KeyRing
 from hapticd.loop.remote_slots import SlotWriter
 from hapticd.remote.bound_socket import BoundSocket
@@ -67,6 +68,7 @@ class SceneSocket:
             # A client that lost its connection and says who it is has its name back at once.
             options={zmq.ROUTER_HANDOVER: 1},
         )
+        self._frames = FrameReader(self._bound.socket)
         self.descriptor = int(self._bound.socket.getsockopt(zmq.FD))
         self._slots: dict[str, int] = {}
         self._writer: SlotWriter | None = None
@@ -130,28 +132,26 @@ class SceneSocket:
     def receive(self) -> bool:
         """Take what has come, at most `MOST_AT_ONCE` messages; whether more may wait."""
         for _ in range(MOST_AT_ONCE):
-            if not self._bound.waits():
-                return False
-            try:
-                who, *frames = self._bound.socket.recv_multipart(zmq.NOBLOCK, copy=False)
-            except zmq.Again:
-                return False
-            self._take(who.bytes, frames)
+            message = self._frames.read() if self._bound.waits() else None
+            if message is None:
+                return self._bound.waits()
+            self._take(message)
         return True
 
     def close(self) -> None:
         """Let go of the path."""
         self._bound.close()
 
-    def _take(self, identity: bytes, frames: Sequence[zmq.Frame]) -> None:
+    def _take(self, message: FirstFrame) -> None:
         now_ns = time.monotonic_ns()
-        fields = _decoded(frames)
+        identity, frame, single = message
+        descriptor = int(frame.get(zmq.SRCFD))
+        fields = _decoded(frame.bytes) if single else None
         if fields is None:
             self.strays += 1
-            self._bound.connections.odd(int(frames[-1].get(zmq.SRCFD)) if frames else -1)
+            self._bound.connections.odd(descriptor)
             self._refusals.add(identity, Refusal("", "a message is one msgpack map with texts as keys"), now_ns)
             return
-        descriptor = int(frames[0].get(zmq.SRCFD))
         self._bound.connections.heard(descriptor)
         if "hello" in fields:
             self._send(identity, self._hello)
@@ -165,7 +165,7 @@ class SceneSocket:
             self._refusals.add(identity, refusal, now_ns)
             return
         try:
-            if port.take(fields, self._sender(port, identity, descriptor, frames[0]), len(self._axes), now_ns):
+            if port.take(fields, self._sender(port, identity, descriptor, frame), len(self._axes), now_ns):
                 self._write(port)
             self._refusals.taken(identity, port.limits.name)
         except NotTakenError as error:
@@ -204,12 +204,10 @@ class SceneSocket:
             self._bound.socket.send_multipart((identity, msgpack.packb(answer)), zmq.NOBLOCK)
 
 
-def _decoded(frames: Sequence[zmq.Frame]) -> dict[str, Any] | None:
-    """The map in these frames; None when there is none."""
-    if len(frames) != 1:
-        return None
+def _decoded(sent: bytes) -> dict[str, Any] | None:
+    """The map in these bytes; None when there is none."""
     try:
-        said = msgpack.unpackb(frames[0].bytes)
+        said = msgpack.unpackb(sent)
     except Exception:  # noqa: BLE001 - msgpack has many ways to say that bytes make no sense
         return None
     if not isinstance(said, dict) or not all(isinstance(key, str) for key in said):

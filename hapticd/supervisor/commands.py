@@ -16,12 +16,13 @@ import zmq
 
 from hapticd.errors import InstanceError
 from hapticd.keys.connections import ConnectionBound, local_peer
+from hapticd.keys.frames import FrameReader
 from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
 
 _LARGEST_REQUEST = 1 << 13  # bytes of a frame
-_MOST_UNREAD = 100  # requests of a client, each of any number of frames
+_MOST_UNREAD = 100  # requests of a client
 _MOST_AT_ONCE = 50
 _LAST_WORDS_MS = 100
 
@@ -68,7 +69,8 @@ class CommandSocket:
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.setsockopt(zmq.LINGER, _LAST_WORDS_MS)
-        self._connections = ConnectionBound(self._socket)
+        self._connections = ConnectionBound(self._socket, keep_heard=False)  # `hapticd disarm` always gets in
+        self._frames = FrameReader(self._socket)
         self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
         self._socket.setsockopt(zmq.RCVHWM, _MOST_UNREAD)
         try:
@@ -97,17 +99,16 @@ class CommandSocket:
             self._gate.turn()
         requests = []
         for _ in range(_MOST_AT_ONCE):
-            try:
-                who, *frames = self._socket.recv_multipart(zmq.NOBLOCK, copy=False)
-            except zmq.Again:
+            message = self._frames.read()
+            if message is None:
                 break
-            reply = self._replier(who.bytes)
-            request = _decoded([frame.bytes for frame in frames])
+            reply = self._replier(message.identity)
+            request = _decoded(message.frame.bytes) if message.single else None
             if request is None:
                 reply(False, 'a request is one msgpack map with a text under "do"')
             else:
-                self._connections.heard(int(frames[0].get(zmq.SRCFD)))
-                requests.append(Request(request, reply, self._who(frames[0])))
+                self._connections.heard(int(message.frame.get(zmq.SRCFD)))
+                requests.append(Request(request, reply, self._who(message.frame)))
         return requests
 
     def close(self) -> None:
@@ -155,12 +156,10 @@ def _names(ring: KeyRing | None) -> dict[str, str]:
     return {} if ring is None else {key.public: name for name, key in ring.clients.items()}
 
 
-def _decoded(frames: list[bytes]) -> dict[str, Any] | None:
-    """The request in these frames; None when it is none."""
-    if len(frames) != 1:
-        return None
+def _decoded(said: bytes) -> dict[str, Any] | None:
+    """The request in these bytes; None when it is none."""
     try:
-        request = msgpack.unpackb(frames[0])
+        request = msgpack.unpackb(said)
     except Exception:  # noqa: BLE001 - msgpack has many ways to say that bytes make no sense
         return None
     if not isinstance(request, dict) or not isinstance(request.get("do"), str):

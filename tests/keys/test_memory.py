@@ -1,0 +1,48 @@
+"""Whose connections are ended when the memory is full, and when that does not help."""
+
+from __future__ import annotations
+
+import pytest
+
+from hapticd.keys import memory
+from hapticd.keys.memory import Culprits, MemoryBound, resident_bytes
+
+BOUND = 100
+
+
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """What is resident, as the test says."""
+    held = [0]
+    monkeypatch.setattr(memory, "resident_bytes", lambda: held[-1])
+    return held
+
+
+def test_a_process_has_more_than_a_megabyte_and_less_than_the_computer() -> None:
+    assert 1 << 20 < resident_bytes() < 1 << 40
+
+
+def test_within_the_bound_no_connection_is_ended(held: list[int]) -> None:
+    bound = MemoryBound(BOUND)
+    held.append(BOUND)
+    assert {bound.turn(0.1 * look) for look in range(50)} == {Culprits.NO_ONE}
+
+
+def test_for_a_second_those_that_send_are_ended_then_all_and_then_the_bound_is_further_up(held: list[int]) -> None:
+    bound = MemoryBound(BOUND)
+    held.append(BOUND + 1)
+    asked = [bound.turn(0.25 * look) for look in range(13)]
+    assert asked == [Culprits.SENDERS] * 4 + [Culprits.ALL] + [Culprits.NO_ONE] * 8
+    held.append(BOUND + 1 + memory._FURTHER_BYTES)
+    assert bound.turn(10.0) is Culprits.NO_ONE
+    held.append(BOUND + 2 + memory._FURTHER_BYTES)
+    assert bound.turn(11.0) is Culprits.SENDERS
+
+
+def test_once_it_has_helped_the_next_time_is_as_the_first(held: list[int]) -> None:
+    bound = MemoryBound(BOUND)
+    for start_s in (0.0, 100.0):
+        held.append(BOUND + 1)
+        assert [bound.turn(start_s + at_s) for at_s in (0.0, 0.5, 1.5)] == [Culprits.SENDERS] * 2 + [Culprits.ALL]
+        held.append(BOUND)
+        assert bound.turn(start_s + 1.6) is Culprits.NO_ONE
