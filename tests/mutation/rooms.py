@@ -18,6 +18,11 @@ LAWS = (
 )
 
 
+LAW_TESTS = ("tests/controllers/test_every_law.py", "tests/controllers/test_recorded_laws.py")
+RUNS = "tests/loop/test_recorded_runs.py"
+WALKS = "tests/shapes/test_recorded_walks.py"
+
+
 @dataclass(frozen=True, slots=True)
 class Room:
     """Some files, and what tests them.
@@ -41,7 +46,7 @@ class Room:
 def _law(name: str) -> Room:
     own = () if name == "none" else (f"tests/controllers/test_{name}.py",)
     select = f"{name} or {name.replace('_', '-')}"
-    return Room((f"controllers/hapticd_controllers/{name}.py",), (*own, "tests/controllers/test_every_law.py"), select)
+    return Room((f"controllers/hapticd_controllers/{name}.py",), (*own, *LAW_TESTS), select)
 
 
 def _tick(*names: str) -> tuple[str, ...]:
@@ -51,19 +56,19 @@ def _tick(*names: str) -> tuple[str, ...]:
 ROOMS = {
     "guard": Room(
         ("hapticd/tick/guard.py",),
-        _tick("guard", "tick_transitions", "tick_books", "tick_motion"),
+        (*_tick("guard", "tick_transitions", "tick_books", "tick_motion"), RUNS),
     ),
-    "energy": Room(("hapticd/tick/energy.py",), _tick("energy", "contact", "tick_books")),
+    "energy": Room(("hapticd/tick/energy.py",), (*_tick("energy", "contact", "tick_books"), RUNS)),
     "tick": Room(
         tuple(f"hapticd/tick/{name}.py" for name in ("tick", "contact", "motion", "arrangement")),
-        ("tests/tick",),
+        ("tests/tick", RUNS),
     ),
     "space": Room(
         (
             *(f"hapticd/tick/space/{name}.py" for name in ("books", "channel", "crease")),
             *(f"hapticd/tick/space/{name}.py" for name in ("solid", "solid_contact", "tick")),
         ),
-        ("tests/tick/space", "tests/shapes/test_solid.py", "tests/shapes/test_friction.py"),
+        ("tests/tick/space", "tests/shapes/test_solid.py", "tests/shapes/test_friction.py", RUNS, WALKS),
     ),
     "shapes": Room(
         tuple(
@@ -72,10 +77,30 @@ ROOMS = {
         ),
         ("tests/shapes", "tests/tick/space"),
     ),
-    "velocity": Room(("hapticd/tick/velocity.py",), _tick("velocity", "tick_motion")),
+    "driven": Room(
+        tuple(
+            f"hapticd/tick/remote/{name}.py"
+            for name in (
+                "books", "coupling", "follower", "line", "one_port", "port", "port_state", "ports", "ramped",
+                "remote_object", "streamed_force", "turning", "update",
+            )
+        ),
+        ("tests/tick/remote", RUNS),
+    ),
+    "door": Room(
+        (*(f"hapticd/remote/{name}.py" for name in ("bound_socket", "delays", "leased_port", "message", "refusals",
+          "scene_socket", "state_map", "state_socket")), "hapticd/loop/remote_slots.py"),
+        (*(f"tests/remote/test_{name}.py" for name in ("message", "refusals", "leased_port", "scene_socket")),
+         "tests/loop/test_remote_slots.py"),
+    ),
+    "release": Room(
+        tuple(f"hapticd/supervisor/{name}.py" for name in ("force_release", "request_queue")),
+        ("tests/loop/test_disarming.py",),
+    ),
+    "velocity": Room(("hapticd/tick/velocity.py",), (*_tick("velocity", "tick_motion"), RUNS)),
     "scene": Room(
         ("hapticd/tick/scene.py",),
-        (*_tick("scene", "wall_changes", "switching", "tick_transitions"), "tests/tick/space/test_changes.py"),
+        (*_tick("scene", "wall_changes", "switching", "tick_transitions"), "tests/tick/space/test_changes.py", RUNS),
     ),
     "loop": Room(
         tuple(f"hapticd/loop/{name}.py" for name in ("loop", "session", "requests", "memory", "resume")),
@@ -83,13 +108,16 @@ ROOMS = {
             f"tests/loop/test_{name}.py"
             for name in (
                 "start", "budget", "watching", "loop", "requests", "disarming", "leaving", "memory", "ramps",
-                "any_order_mutants",
+                "any_order_mutants", "recorded_runs",
             )
         ),
     ),
     **{name: _law(name) for name in LAWS},
     **{
-        name: Room((f"controllers/hapticd_controllers/{name}.py",), ("tests/controllers/test_energy_cycle.py",))
+        name: Room(
+            (f"controllers/hapticd_controllers/{name}.py",),
+            ("tests/controllers/test_energy_cycle.py", "tests/controllers/test_felt_mass.py", *LAW_TESTS),
+        )
         for name in ("cycle_sums", "felt_mass")
     },
     "recovery": Room(

@@ -1,0 +1,18 @@
+"""Every run that is written down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from tests.recorded.journal import Journal
+from tests.recorded.laws import PRESSES
+from tests.recorded.loops import run
+from tests.recorded.scripts import SCRIPTS
+from tests.recorded.walks import WALKS
+
+RUNS: dict[str, Callable[[], Journal]] = {
+    **WALKS,
+    **PRESSES,
+    **{name: partial(run, script) for name, script in SCRIPTS.items()},
+}

@@ -1,0 +1,43 @@
+"""Walks over every solid, smooth and rough, with all that a proxy gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hapticd.shapes.pose import Pose
+from hapticd.shapes.reach import Nearby, slack_m
+from hapticd.shapes.solid import Proxy
+from tests.recorded.hand import Hand
+from tests.recorded.journal import Journal
+from tests.shapes.walks import SOLIDS, go, stand
+
+TICKS = 600
+READ = ("gx", "gy", "gz", "ux", "uy", "uz", "d", "depth_m", "normal_x", "normal_y", "normal_z")
+RUBBED = ("sx", "sy", "sz", "stretch_x", "stretch_y", "stretch_z", "lost_m2", "touching", "sliding")
+
+
+def walk(name: str) -> Journal:
+    """Two hands, one on the solid without friction, one on the rough one, which moves on the way."""
+    journal = Journal()
+    for rough, friction in enumerate([(0.0, 0.0), (0.8, 0.3)]):
+        proxy = Proxy(SOLIDS[name], *friction)
+        first = proxy.shapes[0].pose
+        x, y, z = first.position_m
+        hand = Hand(7 + rough, 3, 0.024, (x, y, z))
+        stand(proxy, hand.go())
+        for journal.tick in range(TICKS):
+            if rough and journal.tick in (120, 160, 161, 400):
+                pose = Pose.of((x + 1e-5 * journal.tick, y, z), (1.0, 0.002 * journal.tick, -0.1, 0.05))
+                journal.note("moved", proxy.move(pose))
+            position_m = hand.go()
+            go(proxy, position_m)
+            for field in (*READ, *RUBBED) if rough else READ:
+                journal.note(f"{rough} {field}", getattr(proxy, field))
+            journal.note(f"{rough} slack", slack_m(proxy, *position_m))
+    return journal
+
+
+WALKS: dict[str, Callable[[], Journal]] = {
+    f"walk {name}": lambda name=name: walk(name)  # type: ignore[misc]  # a name of each one's own
+    for name in SOLIDS
+}
