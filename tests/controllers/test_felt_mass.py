@@ -58,18 +58,16 @@ def felt(path: list[Moved], keep: float, late: bool = False) -> Any:
 
 def fitted(path: list[Moved], keep: float, late: bool, find_delay: bool) -> tuple[float, bool]:
     """The same from all samples at once: m w = u - b s + hand, weighted by how long they are past."""
-    rows = []
+    rows: list[list[float]] = []
     for at, now in enumerate(path):
-        rows = [(weight * keep, *values) for weight, *values in rows] if _seen(path, at) else rows
         if _seen(path, at):
             last = path[at - 1]
             w = now.moved_m / now.dt_s - last.moved_m / last.dt_s
-            s = 0.5 * (now.moved_m + last.moved_m)
             u = 0.5 * (now.applied_n * now.dt_s + last.applied_n * last.dt_s)
             late_u = 0.5 * (last.applied_n * now.dt_s + path[at - 2].applied_n * last.dt_s)
-            rows.append((1.0, w, s, u, late_u))
-    weight, w, s, u, late_u = np.array(rows).T
-    root = np.sqrt(weight)
+            rows.append([w, 0.5 * (now.moved_m + last.moved_m), u, late_u])
+    w, s, u, late_u = np.array(rows).T
+    root = np.sqrt(keep ** np.arange(len(rows) - 1.0, -1.0, -1.0))
     explained, slope = {}, {}
     for name, push in ((False, u), (True, late_u)):
         plain = np.stack([s, np.ones_like(s)], axis=1) * root[:, None]
@@ -157,5 +155,5 @@ def test_to_know_nothing_leaves_nothing_of_before() -> None:
         know_nothing(state, late)
         fresh = felt([], 1.0, late)
         assert vars(state) == vars(fresh)
-        assert {name for name in FeltFields.__annotations__} == vars(fresh).keys() - {"period_s"}
+        assert set(FeltFields.__annotations__) == vars(fresh).keys() - {"period_s"}
         assert all(value == 0.0 for name, value in vars(fresh).items() if name not in ("forces_late", "period_s"))

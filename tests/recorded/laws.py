@@ -62,17 +62,18 @@ def press(law: str, keys: str) -> Journal:
 
 
 def modes(law: str) -> list[str]:
-    """The defaults, each choice that they are not, and each number halved where that may be."""
+    """The defaults, each choice that they are not, and each number halved, or two more of a count."""
     found = [""]
     for name, field in plugins.law(law).Params.model_fields.items():
         if get_origin(field.annotation) is Literal:
             found += [f'{name} = "{each}"\n' for each in get_args(field.annotation) if each != field.default]
         elif field.annotation is bool:
             found.append(f"{name} = {str(not field.default).lower()}\n")
-        elif isinstance(field.default, float) and field.default > 0.0:
+        else:
+            other = field.default + 2 if isinstance(field.default, int) else 0.5 * field.default
             with contextlib.suppress(ValidationError):
-                plugins.law(law).Params.model_validate({name: 0.5 * field.default})
-                found.append(f"{name} = {0.5 * field.default!r}\n")
+                plugins.law(law).Params.model_validate({name: other})
+                found.append(f"{name} = {other!r}\n")
     return found
 
 

@@ -143,7 +143,8 @@ def walls() -> dict[str, Script]:
             WALL
             + SIDE
             + by_law("tdpa")
-            + "[safety]\nmax_axis_force_n = 2.5\nmax_force_n = 3.0\nmax_speed_m_per_s = 3.0\nsupervisor_stall_s = 0.5\n",
+            + "[safety]\nmax_axis_force_n = 2.5\nmax_force_n = 3.0\nmax_speed_m_per_s = 3.0\n"
+            + "supervisor_stall_s = 0.5\n",
             axes="xz",
             declared={"has_sequence": True, "nominal_rate_hz": 1000.0},
             acts={

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hapticd.shapes.pose import Pose
-from hapticd.shapes.reach import Nearby, slack_m
+from hapticd.shapes.reach import slack_m
 from hapticd.shapes.solid import Proxy
 from tests.recorded.hand import Hand
 from tests.recorded.journal import Journal
@@ -24,17 +24,22 @@ def walk(name: str) -> Journal:
         first = proxy.shapes[0].pose
         x, y, z = first.position_m
         hand = Hand(7 + rough, 3, 0.024, (x, y, z))
-        stand(proxy, hand.go())
+        stand(proxy, _point(hand))
         for journal.tick in range(TICKS):
             if rough and journal.tick in (120, 160, 161, 400):
                 pose = Pose.of((x + 1e-5 * journal.tick, y, z), (1.0, 0.002 * journal.tick, -0.1, 0.05))
                 journal.note("moved", proxy.move(pose))
-            position_m = hand.go()
+            position_m = _point(hand)
             go(proxy, position_m)
             for field in (*READ, *RUBBED) if rough else READ:
                 journal.note(f"{rough} {field}", getattr(proxy, field))
             journal.note(f"{rough} slack", slack_m(proxy, *position_m))
     return journal
+
+
+def _point(hand: Hand) -> tuple[float, float, float]:
+    x, y, z = hand.go()
+    return x, y, z
 
 
 WALKS: dict[str, Callable[[], Journal]] = {

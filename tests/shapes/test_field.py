@@ -133,6 +133,18 @@ def test_a_field_that_cannot_be_is_refused(changed: dict[str, object]) -> None:
         Field.unpack(replace(CUBE, **changed).pack())  # type: ignore[arg-type]  # as a field of any kind
 
 
+def test_the_smallest_field_is_read_from_corner_to_corner() -> None:
+    """Two points a side: none of them has a neighbour beyond the last."""
+    least = replace(CUBE, counts=(2, 2, 2), distances_m=array("f", [float(at) for at in range(8)]))
+    part = Part(Placed("mesh", HERE, field=Field.unpack(least.pack())), HERE)
+    edges = (-0.1, -0.0999, -0.05, -1e-9, 0.0, 1e-12)
+    for x, y, z in itertools.product(edges, repeat=3):
+        d, *n = field_distance(part, least.distances_m, x, y, z)
+        within = 10.0 * (4.0 * (x + 0.1) + 2.0 * (y + 0.1) + z + 0.1)
+        assert d == pytest.approx(within, abs=1e-12) or (max(x, y, z) >= 0.0 and 0.05 <= d < 0.0501)
+        assert norm((n[0], n[1], n[2])) == pytest.approx(1.0, abs=1e-14)
+
+
 @pytest.mark.parametrize(("shape", "field"), [("mesh", None), ("sphere", TORUS)])
 def test_a_mesh_has_a_field_and_nothing_else_has(shape: str, field: Field | None) -> None:
     with pytest.raises(ConfigError, match="field"):
