@@ -5,6 +5,10 @@ from __future__ import annotations
 EQUAL: dict[str, tuple[str, ...]] = {
     "at the very bound both give the same number": (
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 0 is Lt]",
+        "hapticd/shapes/distance.py: cylinder_distance: if h <= 0.0:  [LtE 0 is Lt]",
+        "controllers/hapticd_controllers/energy_cycle.py: _end_cycle: if change < 0.0 and params.rule == "
+        "RULE_NON_DECREASING:  [Lt 0 is LtE]",
+        "controllers/hapticd_controllers/energy_cycle.py: _count_energy: if x_m < state.lowest_m:  [Lt 0 is LtE]",
         "hapticd/tick/guard.py: blended: if weight >= 2.0 or -reach_n <= force_n <= reach_n:  [LtE 1 is Lt]",
         "hapticd/tick/guard.py: let_out: return gain if gain * ramp_s >= dt_s * (1.0 - 1e-06) else 0.0  [GtE 0 is Gt]",
         "hapticd/tick/guard.py: Guard.reduce: if newton > max_axis_n or newton < -max_axis_n:  [Gt 0 is GtE]",
@@ -37,6 +41,15 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 0 is Lt]",
         "hapticd/tick/velocity.py: AdaptiveWindow.update: if not lowest <= slope <= highest:  [LtE 1 is Lt]",
     ),
+    "where things lie in the shared memory both sides read from the same number": (
+        "hapticd/loop/memory.py: : _REQUEST = 8192  [8192 is 8193]",
+    ),
+    "numbers that no shape of that kind reads": (
+        "hapticd/shapes/solid.py: Placed.fields: a = b = c = 0.0  [0.0 is 1.0]",
+    ),
+    "a thousand or two connections wait, as ZeroMQ's own pipes have it": (
+        "hapticd/keys/connections.py: : _UNREAD = 1000  [1000 is 1001]",
+    ),
     "a longer frame is no intact message either, and less than a microsecond is none": (
         "drivers/hapticd_drivers/rig/frames.py: _decoded: if len(frame) > LONGEST_FRAME:  [without return None]",
         "drivers/hapticd_drivers/rig/conversation.py: Conversation.await_state: if left_ns <= 0:  [0 is 1]",
@@ -53,6 +66,8 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "self._frozen_s  [GtE 0 is Gt]",
     ),
     "no clock and no sum of measured places comes to it exactly": (
+        "hapticd/loop/loop.py: ControlLoop._run: if behind >= BURST_TICKS and now_ns >= self._burst_due_ns:  [GtE 0 is Gt]",
+        "hapticd/loop/loop.py: ControlLoop._run: over = now_ns - woke_ns > budget_ns  [Gt 0 is GtE]",
         "drivers/hapticd_drivers/rig/conversation.py: Conversation.await_state: if left_ns <= 0:  [LtE 0 is Lt]",
         "drivers/hapticd_drivers/rig/motion.py: _go: if now.time_s - start.time_s > longest_s:  [Gt 0 is GtE]",
         "drivers/hapticd_drivers/rig/motion.py: _nudge: if abs(now.position_m - start.position_m) >= enough_m:  "
@@ -89,10 +104,12 @@ EQUAL: dict[str, tuple[str, ...]] = {
         "2000000000000.0]",
     ),
     "only what is larger than any bound comes so far": (
+        "controllers/hapticd_controllers/energy_cycle.py: _bounded: return LIMIT if value > 0.0 else -LIMIT  [Gt 0 is GtE]",
         "controllers/hapticd_controllers/tdpa.py: _bounded: return LIMIT if value > 0.0 else -LIMIT  [0.0 is 1.0]",
         "controllers/hapticd_controllers/tdpa.py: _bounded: return LIMIT if value > 0.0 else -LIMIT  [Gt 0 is GtE]",
     ),
-    "whatever is small enough to be no length will do": (
+    "whatever is small enough to be no length and no motion will do": (
+        "controllers/hapticd_controllers/energy_cycle.py: : TINY_MOTION = 1e-24  [1e-24 is 2e-24]",
         "hapticd/tick/space/channel.py: slip_along: if -LEAST_M < x_m < LEAST_M:  [Lt 1 is LtE]",
         "hapticd/tick/space/channel.py: : LEAST_M = 1e-15  [1e-15 is 2e-15]",
     ),

@@ -21,6 +21,7 @@ from hapticd.supervisor.reload import switch_request
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.record import RecordLayout
 from hapticd.tick.remote.update import Update
+from hapticd.trace import DriverTrace, lines
 from tests.loop.clock import Clock
 from tests.recorded.hand import Hand
 from tests.recorded.journal import Journal
@@ -71,6 +72,8 @@ class Scripted(Driver[DriverOptions]):
 
     def __init__(self, clock: Clock, journal: Journal, hand: Hand, info: DeviceInfo) -> None:
         super().__init__(DriverOptions(), 1e-3)
+        self.trace = DriverTrace(8)
+        self.metrics[0] = 0.25
         self.read_s = 0.1e-3
         self.stale = False
         self.sample = Sample(len(info.axes))
@@ -114,6 +117,8 @@ class Scripted(Driver[DriverOptions]):
     def _happens(self, what: str, tell: bool = True) -> None:
         if tell:
             self._journal.say(what)
+            self.trace.keep(what)
+            self.metrics[1] += 1.0
         if what in self.befall:
             raise self.befall.pop(what)
 
@@ -162,6 +167,8 @@ class Loop:
             self.journal.say(f"ended: {type(error).__name__}: {error}")
         self._hear()
         self.journal.say(f"left: {left_by(self.shared, self.driver._info or device())}")
+        self.journal.say(f"metrics: {list(self.shared.metrics[:3])}")
+        self.journal.say(f"trace: {[line.partition(' ')[2] for line in lines(self.shared.trace)]}")
         self.shared.close()
         return self.journal
 
@@ -216,7 +223,7 @@ class Loop:
             self.journal.say(f"event {event.code} of tick {event.seq} at {at}: {event.text} {told}")
         if self._asked and self.shared.words[REQUESTS] == self.shared.words[ANSWERED]:
             self._asked = False
-            self.journal.say(f"verdict: {self.shared.verdict()!r}")
+            self.journal.say(f"verdict: {self.shared.verdict().partition(': installed are')[0]!r}")
 
     def _note(self, name: str, value: Any) -> None:
         if value is None:
@@ -231,11 +238,6 @@ class Loop:
             self.journal.note(f"{name} {value!r}", 1.0)
         else:
             self.journal.note(name, float(value))
-
-
-def another(loaded: LoadedConfig, text: str) -> dict[str, Any]:
-    """A request for another configuration."""
-    return switch_request(loaded, parse(text, "another"))
 
 
 def run(script: Script) -> Journal:

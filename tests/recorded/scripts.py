@@ -134,6 +134,7 @@ def walls() -> dict[str, Script]:
                 830: asks("calibrate"),
                 840: asks("arm"),
                 860: asks("arm"),
+                900: switches(CEILING + by_law("tdpa"), law="absent", params={}, keep_law=False),
                 980: asks("clear"),
             },
             ticks=1000,
