@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from hapticd import plugins
-from hapticd.config.loading import LoadedConfig, parse
+from hapticd.config.loading import parse
 from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import DriverError
