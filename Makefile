@@ -81,7 +81,7 @@ $(CLIENTS)/.ready: tests/views/gateway/isaaclab.txt | $(BIN)/python
 	@touch $@
 
 nightly: packages web clients $(READY)
-	$(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
+	SEED=$$(date +%Y%m%d) $(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
 	REPEAT=50 $(BIN)/pytest tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views \
 		tests/remote tests/doctor tests/driven tests/your_simulator tests/test_readme.py tests/test_bridges_page.py \

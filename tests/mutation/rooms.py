@@ -60,7 +60,10 @@ ROOMS = {
     ),
     "energy": Room(("hapticd/tick/energy.py",), (*_tick("energy", "contact", "tick_books"), RUNS)),
     "tick": Room(
-        tuple(f"hapticd/tick/{name}.py" for name in ("tick", "contact", "motion", "arrangement")),
+        tuple(
+            f"hapticd/tick/{name}.py"
+            for name in ("tick", "contact", "motion", "arrangement", "assemble", "fallback")
+        ),
         ("tests/tick", RUNS),
     ),
     "space": Room(
@@ -82,20 +85,21 @@ ROOMS = {
             f"hapticd/tick/remote/{name}.py"
             for name in (
                 "books", "coupling", "follower", "line", "one_port", "port", "port_state", "ports", "ramped",
-                "remote_object", "streamed_force", "turning", "update",
+                "port_site", "remote_object", "streamed_force", "turning", "update",
             )
         ),
         ("tests/tick/remote", RUNS),
     ),
     "door": Room(
-        (*(f"hapticd/remote/{name}.py" for name in ("bound_socket", "delays", "leased_port", "message", "refusals",
-          "scene_socket", "state_map", "state_socket")), "hapticd/loop/remote_slots.py"),
-        (*(f"tests/remote/test_{name}.py" for name in ("message", "refusals", "leased_port", "scene_socket")),
-         "tests/loop/test_remote_slots.py"),
-    ),
-    "release": Room(
-        tuple(f"hapticd/supervisor/{name}.py" for name in ("force_release", "request_queue")),
-        ("tests/loop/test_disarming.py",),
+        (
+            *(f"hapticd/remote/{name}.py" for name in ("bound_socket", "delays", "leased_port", "message", "refusals")),
+            *(f"hapticd/remote/{name}.py" for name in ("scene_socket", "state_map", "state_socket")),
+            "hapticd/loop/remote_slots.py",
+        ),
+        (
+            *(f"tests/remote/test_{name}.py" for name in ("message", "refusals", "leased_port", "scene_socket")),
+            "tests/loop/test_remote_slots.py",
+        ),
     ),
     "velocity": Room(("hapticd/tick/velocity.py",), (*_tick("velocity", "tick_motion"), RUNS)),
     "scene": Room(
@@ -103,12 +107,12 @@ ROOMS = {
         (*_tick("scene", "wall_changes", "switching", "tick_transitions"), "tests/tick/space/test_changes.py", RUNS),
     ),
     "loop": Room(
-        tuple(f"hapticd/loop/{name}.py" for name in ("loop", "session", "requests", "memory", "resume")),
+        tuple(f"hapticd/loop/{name}.py" for name in ("loop", "session", "requests", "memory", "resume", "worker")),
         tuple(
             f"tests/loop/test_{name}.py"
             for name in (
                 "start", "budget", "watching", "loop", "requests", "disarming", "leaving", "memory", "ramps",
-                "any_order_mutants", "recorded_runs",
+                "any_order_mutants", "recorded_runs", "worker",
             )
         ),
     ),
@@ -117,6 +121,7 @@ ROOMS = {
         name: Room(
             (f"controllers/hapticd_controllers/{name}.py",),
             ("tests/controllers/test_energy_cycle.py", "tests/controllers/test_felt_mass.py", *LAW_TESTS),
+            "energy_cycle or energy-cycle or felt_mass",
         )
         for name in ("cycle_sums", "felt_mass")
     },
@@ -137,3 +142,19 @@ ROOMS = {
     ),
     "motion of the rig": Room(("drivers/hapticd_drivers/rig/motion.py",), ("tests/drivers/rig/test_motion.py",)),
 }  # fmt: skip
+
+REACHING = ("hapticd/tick", "hapticd/shapes", "hapticd/loop", "hapticd/keys", "hapticd/remote")
+"""Where a fault reaches a hand or lets someone in."""
+
+LEFT = {
+    "what is told of a tick and not what is done in it": (
+        *(f"hapticd/tick/{name}.py" for name in ("contact_record", "event", "flags", "record")),
+        "hapticd/tick/remote/port_record.py",
+    ),
+    "how a process is started and scheduled; it has no force by then": (
+        *(f"hapticd/loop/{name}.py" for name in ("process", "realtime", "warm_up")),
+        *(f"hapticd/remote/{name}.py" for name in ("priority", "process", "settings")),
+    ),
+    "the side of a client, who opens nothing": ("hapticd/keys/client.py",),
+}
+"""Modules there that are in no room, and why."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.mutation.harmless import EQUAL
-from tests.mutation.rooms import LAWS, ROOMS, Room
+from tests.mutation.rooms import LAWS, LEFT, REACHING, ROOMS, Room
 from tests.mutation.running import ROOT, judge, sample, told
 from tests.mutation.slips import slips
 from tests.mutation.warm import swap
@@ -39,12 +39,21 @@ def test_every_slip_of_a_small_sample_is_found(name: str) -> None:
 @pytest.mark.parametrize("name", ROOMS)
 def test_nearly_every_slip_is_found(name: str) -> None:
     verdict = judge(ROOMS[name], sample(ROOMS[name], NIGHTLY_SLIPS, SEED))
-    assert verdict.share_found >= LEAST_SHARE, f"{verdict}\n{told(verdict.survivors)}"
+    assert verdict.share_found >= LEAST_SHARE, f"{name} at seed {SEED}: {verdict}\n{told(verdict.survivors)}"
 
 
 def test_every_law_has_its_slips() -> None:
     laws = (ROOT / "controllers" / "hapticd_controllers").glob("[a-z]*.py")
     assert sorted((*LAWS, "cycle_sums", "felt_mass")) == sorted(law.stem for law in laws)
+
+
+def test_every_module_that_reaches_a_hand_is_in_a_room_or_it_is_said_why_not() -> None:
+    there = {str(file.relative_to(ROOT)) for place in REACHING for file in (ROOT / place).rglob("[a-z]*.py")}
+    judged = {file for room in ROOMS.values() for file in room.files}
+    assert there - judged == {file for files in LEFT.values() for file in files}
+    assert {file for file in judged if not (ROOT / file).is_file()} == set()
+    tests = {test for room in ROOMS.values() for test in room.tests}
+    assert {test for test in tests if not (ROOT / test).exists()} == set()
 
 
 def test_what_is_named_harmless_is_a_slip_that_there_is() -> None:
