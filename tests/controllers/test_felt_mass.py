@@ -132,12 +132,17 @@ def test_a_force_that_hardly_varies_or_brakes_tells_no_mass(late: bool) -> None:
         assert (state.felt_mass_kg, state.forces_late) == (0.7, late)
 
 
-def test_a_standstill_in_which_nothing_goes_with_the_speed_is_no_division_by_zero() -> None:
-    """Moves of one size to and fro: s is the same all the time."""
-    path = [Moved(1.0 + 0.5 * (-1.0) ** number, 1e-5, PERIOD_S) for number in range(60)]
-    state = felt(path, 1.0)
+@examples(20)
+@given(seed=st.integers(0, 2**32), known_late=st.booleans())
+def test_where_nothing_goes_with_the_speed_no_friction_is_seen(seed: int, known_late: bool) -> None:
+    """A shake to and fro by the same way: the mean move is always 0, and so is what viscous friction brakes."""
+    rng = random.Random(seed)
+    path = [Moved(rng.uniform(0.5, 2.0), 1e-5 * (-1.0) ** number, PERIOD_S) for number in range(60)]
+    state = felt(path, 1.0, known_late)
     believe(state, True)
-    assert state.felt_mass_kg == 0.0
+    expected_kg, expected_late = fitted(path, 1.0, known_late, True)
+    assert state.forces_late == expected_late
+    assert state.felt_mass_kg == pytest.approx(expected_kg, rel=1e-5)
 
 
 @given(resolution=st.floats(1e-6, 1e-4), share=st.floats(0.5, 1.5))
