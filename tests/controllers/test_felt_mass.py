@@ -119,6 +119,15 @@ def test_the_true_mass_and_the_true_delay_come_out(late: bool) -> None:
     assert state.felt_mass_kg == pytest.approx(0.25, rel=0.02)
 
 
+@pytest.mark.parametrize(("seed", "mass_kg", "viscous"), [(3, 0.134, -4.38), (4, 0.133, -10.56), (9, 0.242, -6.77)])
+def test_a_device_that_seems_to_push_by_itself_is_one_sample_late(seed: int, mass_kg: float, viscous: float) -> None:
+    """No friction is below zero; a force that comes late looks as if it were. With the opposite sign it is on time."""
+    pushing, braking = (felt(ride(seed, mass_kg, b, False, 90), 1.0, False) for b in (viscous, -viscous))
+    for state in (pushing, braking):
+        believe(state, True)
+    assert (pushing.forces_late, braking.forces_late) == (True, False)
+
+
 @pytest.mark.parametrize("late", [False, True])
 def test_a_force_that_hardly_varies_or_brakes_tells_no_mass(late: bool) -> None:
     """What was believed before stays."""
