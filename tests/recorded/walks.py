@@ -6,12 +6,29 @@ from collections.abc import Callable
 
 from hapticd.shapes.pose import Pose
 from hapticd.shapes.reach import slack_m
-from hapticd.shapes.solid import Proxy
+from hapticd.shapes.solid import Placed, Proxy
 from tests.recorded.hand import Hand
 from tests.recorded.journal import Journal
 from tests.shapes.walks import SOLIDS, go, stand
 
 TICKS = 600
+ASKEW = (0.9, 0.2, -0.1, 0.3)
+
+
+def hole(orientation: tuple[float, float, float, float]) -> list[Placed]:
+    """Five boxes that are flush about a pit, in whose corners a slide runs against faces that are hidden."""
+    frame = Pose.of((0.0, 0.0, 0.0), orientation)
+    boxes = [
+        ((0.0, 0.0, -0.012), (0.05, 0.05, 0.01)),
+        ((0.015, 0.0, 0.008), (0.02, 0.05, 0.03)),
+        ((-0.015, 0.0, 0.008), (0.02, 0.05, 0.03)),
+        ((0.0, 0.015, 0.008), (0.05, 0.02, 0.03)),
+        ((0.0, -0.015, 0.008), (0.05, 0.02, 0.03)),
+    ]
+    return [Placed("box", Pose.of(frame.point(at_m), orientation), size_m=size_m) for at_m, size_m in boxes]
+
+
+PLACES = SOLIDS | {"hole": hole((1.0, 0.0, 0.0, 0.0)), "askew hole": hole(ASKEW)}
 READ = ("gx", "gy", "gz", "ux", "uy", "uz", "d", "depth_m", "normal_x", "normal_y", "normal_z")
 RUBBED = ("sx", "sy", "sz", "stretch_x", "stretch_y", "stretch_z", "lost_m2", "touching", "sliding")
 
@@ -20,10 +37,11 @@ def walk(name: str) -> Journal:
     """Two hands, one on the solid without friction, one on the rough one, which moves on the way."""
     journal = Journal()
     for rough, friction in enumerate([(0.0, 0.0), (0.8, 0.3)]):
-        proxy = Proxy(SOLIDS[name], *friction)
+        proxy = Proxy(PLACES[name], *friction)
         first = proxy.shapes[0].pose
         x, y, z = first.position_m
-        hand = Hand(7 + rough, 3, 0.024, (x, y, z))
+        reach_m, middle_m = (0.01, (0.0, 0.0, 0.0)) if "hole" in name else (0.024, (x, y, z))
+        hand = Hand(7 + rough, 3, reach_m, middle_m)
         stand(proxy, _point(hand))
         for journal.tick in range(TICKS):
             if rough and journal.tick in (120, 160, 161, 400):
@@ -44,5 +62,5 @@ def _point(hand: Hand) -> tuple[float, float, float]:
 
 WALKS: dict[str, Callable[[], Journal]] = {
     f"walk {name}": lambda name=name: walk(name)  # type: ignore[misc]  # a name of each one's own
-    for name in SOLIDS
+    for name in PLACES
 }
