@@ -14,7 +14,16 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import DriverError
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import ANSWERED, DISARM, REQUESTS, SUPERVISOR_BEAT, EventReader, RecordReader, SharedMemory
+from hapticd.loop.memory import (
+    ANSWERED,
+    DISARM,
+    REQUESTS,
+    SKIPPED,
+    SUPERVISOR_BEAT,
+    EventReader,
+    RecordReader,
+    SharedMemory,
+)
 from hapticd.loop.remote_slots import SlotWriter
 from hapticd.loop.resume import FROM_START, ResumeState, left_by
 from hapticd.supervisor.reload import switch_request
@@ -215,6 +224,7 @@ class Loop:
         return woke_ns
 
     def _hear(self) -> None:
+        self.journal.note("skipped, as the supervisor sees it", float(self.shared.words[SKIPPED]))
         for record in self._records.read():
             self._note("", record)
         for event in self._events.read():

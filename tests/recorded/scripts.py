@@ -165,6 +165,7 @@ def walls() -> dict[str, Script]:
                 600: asks("clear"),
                 605: asks("arm"),
                 700: silent(True),
+                1230: asks("clear"),
                 1250: silent(False),
                 1260: asks("clear"),
                 1265: asks("arm"),

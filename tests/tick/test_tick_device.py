@@ -217,9 +217,10 @@ def test_a_device_that_is_not_calibrated_may_say_anything_and_calibrated_it_need
     assert rig.force(-1e-3) == 2.0
 
 
-def test_a_device_that_is_calibrated_and_still_makes_no_sense_is_a_fault() -> None:
+@pytest.mark.parametrize("ticks", [0, 30])
+def test_a_device_that_is_calibrated_and_still_makes_no_sense_is_a_fault(ticks: int) -> None:
     rig = uncalibrated(at_m=5.0)
-    rig.forces(5.0, 30)
+    rig.forces(5.0, ticks)
     rig.sample.calibrated = True
     assert rig.force(5.0) == 0.0
     assert rig.tick.fault == EventCode.SAMPLE_IMPOSSIBLE

@@ -52,6 +52,19 @@ def test_no_force_jumps_when_an_object_changes(after: str) -> None:
     assert rig.unbalanced_j() < 1e-13
 
 
+def test_friction_that_is_taken_away_takes_its_laws_along_and_new_friction_learns_anew() -> None:
+    rough = ball(static_friction=0.5, dynamic_friction=0.4)
+    rig = pressed(rough).to((0.002, 0.0, 0.0292), 60)
+    (contact,) = rig.tick.solids
+    before = [channel.law for channel in contact.channels]
+    rig.switch(ball()).to((0.0, 0.0, 0.0292), 60)
+    assert [channel.law for channel in contact.channels] == before[:1]
+    rig.switch(rough).to((0.002, 0.0, 0.0292), 60)
+    after = [channel.law for channel in contact.channels]
+    assert len(after) == 3
+    assert [law in before for law in after] == [True, False, False]
+
+
 @pytest.mark.parametrize("moved_m", [0.03, -0.01])
 def test_a_part_of_a_union_that_moves_takes_its_surface_with_it(moved_m: float) -> None:
     """Two balls are one solid; the second moves to the device or away from it, and the first stays."""
