@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import ModuleType
-from typing import Any
 
 from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DeviceTimeoutError
 from hapticd.loop.resume import ResumeState
@@ -19,9 +17,24 @@ from hapticd.tick.remote.update import (
     TURNING,
     VELOCITY,
 )
+from tests.recorded.acts import (
+    asks,
+    befalls,
+    calibrated,
+    computes,
+    fails,
+    freeze,
+    jumping,
+    moving,
+    placed_at,
+    reads_take,
+    silent,
+    switches,
+    thaw,
+    with_broken_law,
+)
 from tests.recorded.loops import Loop, Script
-from tests.recorded.scenes import CUP, CUP_CHANGED, ROOM
-from tests.tick.rig import law, returns
+from tests.recorded.scenes import CUP, CUP_CHANGED, ROOM, thing
 
 WALL = "[[scene.walls]]\nstiffness_n_per_m = 1500.0\nposition_m = 0.002\n"
 CHANGING = (
@@ -34,84 +47,6 @@ SIDE = '[[scene.walls]]\naxis = "x"\nstiffness_n_per_m = 2500.0\nposition_m = -0
 
 def by_law(name: str, more: str = "") -> str:
     return f'[controller]\nlaw = "{name}"\n{more}'
-
-
-def freeze(loop: Loop) -> None:
-    loop.driver.stale = True
-
-
-def thaw(loop: Loop) -> None:
-    loop.driver.stale = False
-
-
-def reads_take(read_s: float) -> Any:
-    return lambda loop: setattr(loop.driver, "read_s", read_s)
-
-
-def placed_at(value: float) -> Any:
-    def act(loop: Loop) -> None:
-        loop.driver.moves = False
-        loop.driver.sample.position_m[0] = value
-
-    return act
-
-
-def moving(loop: Loop) -> None:
-    loop.driver.moves = True
-
-
-def calibrated(yes: bool) -> Any:
-    return lambda loop: setattr(loop.driver.sample, "calibrated", yes)
-
-
-def computes(computes_s: float) -> Any:
-    return lambda loop: setattr(loop, "computes_s", computes_s)
-
-
-def asks(do: str, **request: Any) -> Any:
-    return lambda loop: loop.ask(do=do, **request)
-
-
-def switches(text: str, **other: Any) -> Any:
-    return lambda loop: loop.switch(text, **other)
-
-
-def silent(yes: bool) -> Any:
-    return lambda loop: setattr(loop, "beats", not yes)
-
-
-def befalls(what: str, error: Exception) -> Any:
-    return lambda loop: loop.driver.befall.__setitem__(what, error)
-
-
-def fails(code: EventCode) -> Any:
-    return lambda loop: loop.tick.fail(code, "a fault")
-
-
-def knows(name: str, module: ModuleType) -> Any:
-    return lambda loop: loop.loop.requests.know(name, module)
-
-
-def with_broken_law(text: str) -> Any:
-    """Switch to a law that goes well for ninety ticks of a contact and then raises."""
-    calls = []
-
-    def step(_state: Any, _params: Any, tick: Any) -> Any:
-        calls.append(tick)
-        if len(calls) > 90:
-            raise ZeroDivisionError("of its own")
-        return returns(0.9 * tick.contact_n)(None, None, None)
-
-    def act(loop: Loop) -> None:
-        loop.loop.requests.know("broken", law(step))
-        loop.switch(text, law="broken", params={}, keep_law=False)
-
-    return act
-
-
-def jumping(loop: Loop) -> None:
-    """A device that jumps by a millimetre every tick: fast, and nowhere."""
-    loop.driver.off_m = 0.004 if loop.driver.off_m == 0.0 else 0.0
 
 
 def walls() -> dict[str, Script]:
@@ -357,4 +292,51 @@ def space() -> dict[str, Script]:
     }
 
 
-SCRIPTS = walls() | driven() | space()
+def seldom(loop: Loop) -> None:
+    """A device that has something new at two of five reads, while things change at any of them."""
+    loop.driver.stale = loop.journal.tick % 5 not in (0, 3)
+
+
+def slow() -> dict[str, Script]:
+    """Devices that are slower than the loop."""
+    declared = {"has_sequence": True, "nominal_rate_hz": 400.0, "max_force_n": 8.0}
+    rough = thing("ball", "sphere", radius_m=0.012, static_friction=0.7, dynamic_friction=0.5)
+    smooth = thing("ball", "sphere", radius_m=0.0125, stiffness=2200.0)
+    hollow = thing("ball", "box", size_m=[0.02, 0.02, 0.02], inside=True)
+    scenes = [rough, smooth, hollow, rough, WALL, rough + SIDE, hollow, smooth]
+    return {
+        "slow in space": Script(
+            rough + by_law("tdpa"),
+            axes="xyz",
+            declared=declared,
+            seed=41,
+            reach_m=0.012,
+            each_tick=seldom,
+            acts={
+                **{100 * (at + 1): switches(scene + by_law("tdpa")) for at, scene in enumerate(scenes)},
+                230: Loop.disarm,
+                251: asks("arm"),
+                431: Loop.disarm,
+                433: asks("arm"),
+            },
+        ),
+        "slow at walls": Script(
+            CHANGING + CEILING + by_law("set-position"),
+            declared=declared,
+            seed=42,
+            each_tick=seldom,
+            acts={
+                150: switches(WALL + by_law("set-position")),
+                290: switches(CEILING + by_law("energy-cycle")),
+                410: Loop.disarm,
+                431: asks("arm"),
+                520: switches(CEILING + WALL + by_law("energy-cycle")),
+                660: fails(EventCode.OVER_SPEED),
+                680: asks("clear"),
+                685: asks("arm"),
+            },
+        ),
+    }
+
+
+SCRIPTS = walls() | driven() | space() | slow()
