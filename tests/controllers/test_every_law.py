@@ -207,7 +207,7 @@ def hostile_ticks(draw: st.DrawFn) -> list[LawTick]:
 
 @each_law
 @given(ticks=hostile_ticks(), data=st.data())
-@examples(150)
+@examples(120)
 def test_finite_ticks_give_a_finite_force_and_a_state_of_numbers(
     law: ModuleType, ticks: list[LawTick], data: st.DataObject
 ) -> None:

@@ -137,7 +137,7 @@ ROOMS = {
         tuple(f"drivers/hapticd_drivers/rig/{name}.py" for name in ("messages", "frames", "conversation", "mapping")),
         tuple(
             f"tests/drivers/rig/test_{name}.py"
-            for name in ("messages", "conversation", "mapping", "serial_driver", "serial_faults")
+            for name in ("questions", "messages", "conversation", "mapping", "serial_driver", "serial_faults")
         ),
     ),
     "motion of the rig": Room(("drivers/hapticd_drivers/rig/motion.py",), ("tests/drivers/rig/test_motion.py",)),
