@@ -130,7 +130,10 @@ ROOMS = {
         ("tests/daemon/test_recovery.py", "tests/daemon/test_plugged_in.py", "tests/loop/test_leaving.py"),
     ),
     "keys": Room(
-        tuple(f"hapticd/keys/{name}.py" for name in ("connections", "file", "heartbeat", "policy", "server", "store")),
+        tuple(
+            f"hapticd/keys/{name}.py"
+            for name in ("connections", "file", "frames", "heartbeat", "memory", "policy", "server", "store")
+        ),
         ("tests/keys",),
     ),
     "rig": Room(
