@@ -116,6 +116,13 @@ def test_who_says_what_makes_no_sense_is_dropped_in_the_end_and_no_other() -> No
             assert who.bytes
 
 
+def test_who_has_left_counts_no_more() -> None:
+    with bounded() as (bound, _, where):
+        with sockets.create_connection(where), sockets.create_connection(where):
+            wait_until(lambda: sum(map(len, bound._endpoints.values())) == 2, "news of both connections")
+        wait_until(lambda: not any(bound._endpoints.values()), "news of their ends")
+
+
 def test_of_an_endpoint_that_is_given_up_nothing_is_kept() -> None:
     """Its port may be bound again, with all its connections to come."""
     with bounded() as (bound, socket, where), sockets.create_connection(where):
