@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import socket as sockets
+import stat
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,9 +15,10 @@ import zmq
 from hapticd.config.loading import parse
 from hapticd.errors import ConfigError
 from hapticd.keys.connections import DESCRIPTORS, MOST_CONNECTIONS, MOST_ODD, ConnectionBound, has_ended, inode_of
-from hapticd.keys.file import new_pair, write
+from hapticd.keys.file import new_pair, read, write
 from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.policy import key_ring, stays_here, takes_keys, tcp_endpoints
+from hapticd.keys.store import KeyDirectory
 
 PAGE = " ".join((Path(__file__).parents[2] / "docs" / "telemetry.md").read_text().split())
 
@@ -121,6 +124,30 @@ def test_a_key_has_its_group_and_its_rights_before_it_has_its_name(
     monkeypatch.setattr(os, "fchmod", give_rights)
     write(path, new_pair(), mode=0o640, group=77)
     assert done == [("owner -1", 77, False), ("mode", 0o640, False)]
+
+
+def test_a_directory_of_keys_is_closed_to_others_from_its_first_moment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the umask, before it has its group and its rights."""
+    seen: list[int] = []
+    monkeypatch.setattr(os, "chown", lambda path, _user, _group: seen.append(stat.S_IMODE(path.stat().st_mode)))
+    before = os.umask(0)
+    try:
+        KeyDirectory(tmp_path / "keys").make()
+    finally:
+        os.umask(before)
+    assert seen == [0o700, 0o700]
+
+
+@pytest.mark.parametrize("rights", ["", "all", "Watch", "watch,command", "command watch"])
+def test_a_key_of_which_it_is_not_clear_what_it_may_is_refused(tmp_path: Path, rights: str) -> None:
+    path = tmp_path / "some.key"
+    write(path, replace(new_pair(), secret="", watch_only=True))
+    assert read(path).watch_only
+    path.write_text(path.read_text().replace('rights = "watch"', f'rights = "{rights}"'))
+    with pytest.raises(ConfigError, match='must be "command" or "watch"'):
+        read(path)
 
 
 def test_signs_of_life_are_sent_each_second_and_missed_after_four() -> None:
