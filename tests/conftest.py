@@ -10,6 +10,7 @@ import sys
 import zipfile
 from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -29,12 +30,30 @@ settings.register_profile("unhurried", examples(100), deadline=None, derandomize
 settings.load_profile("unhurried")
 
 
-def pytest_configure() -> None:
+class _AmongOthers:
+    """With pytest-xdist, the process of it all hears from each worker what that has repeated."""
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        output = getattr(session.config, "workeroutput", None)
+        if output is not None:
+            output["repeated"] = repeating.times()
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        repeating.add(getattr(node, "workeroutput", {}).get("repeated", {}))
+
+
+def pytest_configure(config: pytest.Config) -> None:
     """Give every child the signals that a terminal gives it: a runner in the background has them ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     if repeating.REPEAT > 1:
         repeating.watch_for_daemons()
+        config.pluginmanager.register(_AmongOthers())
+        if not hasattr(config, "workerinput"):  # one busy processor for all workers
+            busy = contextlib.ExitStack()
+            busy.enter_context(repeating.busy_processor())
+            config.add_cleanup(busy.close)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -61,21 +80,6 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site-packages")
     return folder / "site-packages"
-
-
-@pytest.fixture(scope="session", autouse=True)
-def busy() -> Generator[None, None, None]:
-    """Where tests are repeated they run beside a busy processor."""
-    with repeating.busy_processor() if repeating.REPEAT > 1 else contextlib.nullcontext():
-        yield
-
-
-@pytest.fixture(autouse=True)
-def own_packages() -> Generator[None, None, None]:
-    """Forget the packages of a laboratory's own that a test has made, so that the next test finds none of that name."""
-    yield
-    for name in [name for name in sys.modules if name.partition(".")[0] in OWN_PACKAGES]:
-        del sys.modules[name]
 
 
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:

@@ -1,6 +1,7 @@
 """Every test that starts a daemon, many times over beside a busy processor: a verdict that hangs on luck shows so.
 
-`REPEAT=50 pytest tests/daemon` is what the nightly run has. A test that starts none runs once, as always.
+`REPEAT=50 pytest tests/daemon` is what the nightly run has. A test that starts none runs once, as always. With
+`--numprocesses 4 --dist load --maxschedchunk 1` four tests are repeated side by side, each in a process of its own.
 """
 
 from __future__ import annotations
@@ -52,6 +53,17 @@ def repeated(item: pytest.Item, next_item: pytest.Item | None) -> bool:
             break
     hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+def times() -> dict[str, int]:
+    """How often each test that started a daemon has run in this process."""
+    return dict(_times)
+
+
+def add(others: dict[str, int]) -> None:
+    """Count what another process has run; a test that starts the daemon of its file does so in each of them."""
+    for name, count in others.items():
+        _times[name] = max(count, _times.get(name, 0))
 
 
 def said() -> str:
