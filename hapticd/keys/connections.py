@@ -98,7 +98,7 @@ class ConnectionBound:
         """A client has said something that makes sense: those that have not are dropped before it.
 
         Args:
-            descriptor: of its connection, as ZeroMQ tells with a message.
+            descriptor: of its connection, by `descriptor_of`.
         """
         with self._lock:
             for clients in self._endpoints.values():
@@ -109,7 +109,7 @@ class ConnectionBound:
         """A client has said what makes no sense; past `MOST_ODD` of it, it is disconnected.
 
         Args:
-            descriptor: of its connection, as ZeroMQ tells with a message.
+            descriptor: of its connection, by `descriptor_of`.
 
         Returns:
             Whether that was the last.
@@ -197,11 +197,19 @@ class _Client:
     odd: int = 0
 
 
+def descriptor_of(frame: zmq.Frame) -> int:
+    """The connection that a frame came by; -1 where ZeroMQ does not know, as of what is no request of a subscriber."""
+    try:
+        return int(frame.get(zmq.SRCFD))
+    except zmq.ZMQError:
+        return -1
+
+
 def local_peer(descriptor: int) -> str:
     """Who is at the other end of a connection within this computer, as the kernel knows; "" when it does not.
 
     Args:
-        descriptor: of the connection, as ZeroMQ tells with a message.
+        descriptor: of the connection, by `descriptor_of`.
     """
     with contextlib.suppress(OSError), _held(descriptor) as connection:
         size = struct.calcsize(_CREDENTIALS)
@@ -223,7 +231,7 @@ def has_ended(descriptor: int, inode: int) -> bool:
     """Whether a connection has ended, also before ZeroMQ has seen that: its other end is closed.
 
     Args:
-        descriptor: of it, as ZeroMQ tells with a message.
+        descriptor: of it, by `descriptor_of`.
         inode: what `inode_of` said of it.
     """
     if inode_of(descriptor) != inode or not inode:

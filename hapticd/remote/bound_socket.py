@@ -7,7 +7,7 @@ from pathlib import Path
 import zmq
 
 from hapticd.errors import InstanceError
-from hapticd.keys.connections import ConnectionBound, local_peer
+from hapticd.keys.connections import ConnectionBound, descriptor_of, local_peer
 from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
@@ -95,7 +95,7 @@ class BoundSocket:
         try:
             key = str(frame.get("User-Id"))
         except zmq.ZMQError:  # it came in without a key, so from this computer
-            return True, local_peer(int(frame.get(zmq.SRCFD))) or "one who has gone"
+            return True, local_peer(descriptor_of(frame)) or "one who has gone"
         return False, f"{self._names.get(key, 'a key that is no longer listed')} at {frame.get('Peer-Address')}"
 
     def close(self) -> None:

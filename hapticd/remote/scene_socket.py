@@ -18,7 +18,7 @@ import msgpack
 import zmq
 
 from hapticd.config.ports import PortLimits
-from hapticd.keys.connections import has_ended, inode_of
+from hapticd.keys.connections import descriptor_of, has_ended, inode_of
 from hapticd.keys.frames import FirstFrame, FrameReader
 from hapticd.keys.store import KeyRing
 from hapticd.loop.remote_slots import SlotWriter
@@ -145,7 +145,7 @@ class SceneSocket:
     def _take(self, message: FirstFrame) -> None:
         now_ns = time.monotonic_ns()
         identity, frame, single = message
-        descriptor = int(frame.get(zmq.SRCFD))
+        descriptor = descriptor_of(frame)
         fields = _decoded(frame.bytes) if single else None
         if fields is None:
             self.strays += 1

@@ -8,6 +8,7 @@ from typing import Any
 import msgpack
 import zmq
 
+from hapticd.keys.connections import descriptor_of
 from hapticd.keys.store import KeyRing
 from hapticd.remote.bound_socket import BoundSocket
 
@@ -62,11 +63,11 @@ class StateSocket:
             said = request.bytes
             if said == b"\x01":
                 self.subscribed = True
-                self._bound.connections.heard(int(request.get(zmq.SRCFD)))
+                self._bound.connections.heard(descriptor_of(request))
             elif said == b"\x00":  # the last of them: ZeroMQ tells of no other
                 self.subscribed = False
             elif said[:1] == b"\x01":
-                self._bound.connections.odd(int(request.get(zmq.SRCFD)))
+                self._bound.connections.odd(descriptor_of(request))
 
     def send(self, state: dict[str, Any]) -> None:
         """Tell a tick; a subscriber that is too slow loses it."""

@@ -15,7 +15,7 @@ import msgpack
 import zmq
 
 from hapticd.errors import InstanceError
-from hapticd.keys.connections import ConnectionBound, local_peer
+from hapticd.keys.connections import ConnectionBound, descriptor_of, local_peer
 from hapticd.keys.frames import FrameReader
 from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.server import CurveServer
@@ -107,7 +107,7 @@ class CommandSocket:
             if request is None:
                 reply(False, 'a request is one msgpack map with a text under "do"')
             else:
-                self._connections.heard(int(message.frame.get(zmq.SRCFD)))
+                self._connections.heard(descriptor_of(message.frame))
                 requests.append(Request(request, reply, self._who(message.frame)))
         return requests
 
@@ -137,7 +137,7 @@ class CommandSocket:
         try:
             key = str(frame.get("User-Id"))
         except zmq.ZMQError:  # it came in without a key, so from this computer
-            return local_peer(int(frame.get(zmq.SRCFD))) or "one who has gone"
+            return local_peer(descriptor_of(frame)) or "one who has gone"
         return f"{self._names.get(key, 'a key that is no longer listed')} at {frame.get('Peer-Address')}"
 
     def _replier(self, identity: bytes) -> Reply:

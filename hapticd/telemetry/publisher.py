@@ -17,7 +17,7 @@ import zmq
 
 from hapticd.config.models import TelemetryConfig
 from hapticd.errors import InstanceError
-from hapticd.keys.connections import ConnectionBound
+from hapticd.keys.connections import ConnectionBound, descriptor_of
 from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.policy import stays_here
 from hapticd.keys.server import CurveServer
@@ -258,12 +258,11 @@ class Publisher:
     def _asked_for(self, request: zmq.Frame) -> list[Topic]:
         """The topics that a request subscribes to; a client that asks for too much else is disconnected."""
         said = request.bytes
-        if said[:1] == b"\x00":  # the end of a subscription; a client that has gone has no connection
+        if said[:1] != b"\x01":  # the end of a subscription; a client that has gone has no connection
             return []
-        connection = int(request.get(zmq.SRCFD))
-        subscribes = said[:1] == b"\x01"
-        self.counts.subscriptions += subscribes
-        topics = [topic for topic in Topic if topic.encode().startswith(said[1:])] if subscribes else []
+        connection = descriptor_of(request)
+        self.counts.subscriptions += 1
+        topics = [topic for topic in Topic if topic.encode().startswith(said[1:])]
         if topics:
             self._connections.heard(connection)
         elif self._connections.odd(connection):
