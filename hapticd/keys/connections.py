@@ -37,7 +37,7 @@ MOST_ODD = 32
 """What a client may say that makes no sense before it is disconnected: it may be mistaken, but not for ever."""
 
 _UNREAD = 1000
-_QUIET_S = 60.0  # between two lines in the log about the same endpoint
+_QUIET_S = 60.0  # between two lines in the log that say the same of an endpoint
 _LOOK_MS = 50
 _SENDING_S = 0.02  # in this time who sends without a pause is seen to have sent
 _NEWS = zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED | zmq.EVENT_CLOSED | zmq.EVENT_MONITOR_STOPPED
@@ -160,7 +160,7 @@ class ConnectionBound:
                 if self._endpoints.get(endpoint, {}).pop(descriptor, None) is not None:
                     _shut(descriptor, endpoint)
         for endpoint in {endpoint for _, endpoint in ended}:
-            log.warning("%s: what clients have sent fills the memory; those that send were disconnected", endpoint)
+            self._tell(endpoint, "what clients have sent fills the memory; those that send were disconnected")
 
     def _learn(self, event: int, descriptor: int, endpoint: str) -> None:
         if event == zmq.EVENT_CLOSED:  # the endpoint itself, and with it all that were connected there
@@ -176,7 +176,7 @@ class ConnectionBound:
             victim = self._victim(clients)
             del clients[victim]
             _shut(victim, endpoint)
-            self._tell(endpoint)
+            self._tell(endpoint, f"more than {self._most} connections; the oldest that say nothing are dropped")
 
     def _victim(self, clients: dict[int, _Client]) -> int:
         *before, _newest = clients
@@ -184,11 +184,11 @@ class ConnectionBound:
             return next(one for one, client in clients.items() if not client.heard_s)
         return min(before, key=lambda one: clients[one].heard_s)
 
-    def _tell(self, endpoint: str) -> None:
+    def _tell(self, endpoint: str, what: str) -> None:
         now_s = time.monotonic()
-        if now_s - self._told_s.get(endpoint, -_QUIET_S) >= _QUIET_S:
-            self._told_s[endpoint] = now_s
-            log.warning("%s: more than %d connections; the oldest that say nothing are dropped", endpoint, self._most)
+        if now_s - self._told_s.get(endpoint + what, -_QUIET_S) >= _QUIET_S:
+            self._told_s[endpoint + what] = now_s
+            log.warning("%s: %s", endpoint, what)
 
 
 @dataclass(slots=True)

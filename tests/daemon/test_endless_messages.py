@@ -26,16 +26,19 @@ LARGEST_MB = 450.0
 MOST_HELD = 200 << 20
 """What each client would fill, were it not stopped: three of them more than the unit allows [bytes]."""
 
-CASES = (("control", b"DEALER", 0), ("control", b"DEALER", 8000), ("telemetry", b"SUB", 0), ("scene", b"DEALER", 1))
+CASES = (("control", b"DEALER", 0), ("telemetry", b"SUB", 0), ("scene", b"DEALER", 2000))
 SENDERS = 3
+FILLS_PER_S = 32e6
+"""By each of them: as fast as it can, and what is held would say how busy the computer is [bytes/s]."""
+
 FRAME_COSTS = 64
 """ZeroMQ keeps this for each, whatever is in it [bytes]."""
 
 
-@pytest.fixture
-def daemon(monkeypatch: pytest.MonkeyPatch) -> Iterator[Daemon]:
-    with Daemon(CONFIG) as daemon:
-        monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(daemon.directory / "run"))
+@pytest.fixture(scope="module")
+def daemon() -> Iterator[Daemon]:
+    with Daemon(CONFIG) as daemon, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("HAPTICD_RUNTIME_DIR", str(daemon.directory / "run"))
         yield daemon.wait_ready()
 
 
@@ -57,6 +60,7 @@ def send_until_ended(raw: socket.socket, size: int) -> None:
     with contextlib.suppress(ConnectionError):
         for _ in range(MOST_HELD // (frames * (size + FRAME_COSTS))):
             raw.sendall(frame * frames)
+            time.sleep(frames * (size + FRAME_COSTS) / FILLS_PER_S)
         while raw.recv(1 << 16):
             pass
 
