@@ -83,8 +83,12 @@ def test_minutes_of_both_days_keep_their_sums_and_go_on_learning() -> None:
         (text,) = (line.text for line in lines if day.hand in line.text)
         assert f"{day.damping_n_s_per_m:.3g}" in text
         assert f"{day.adapted_n_s_per_m:.3g}" in text
+        assert f"felt {day.felt[0]:.2g}, force spans {day.chatter_n[0]:.2g} N" in text
         assert not replace(day, kept_outcome=Outcome.MOVING).holds
         assert day.resolution_j < 1e-10 * abs(day.cycle_j)
+    assert days[1].kept_outcome is Outcome.SETTLED
+    assert days[1].felt[0] > 3.0  # still, with twice the damping, and felt all the same
+    assert days[1].chatter_n[0] > 1.0
 
 
 def test_a_ledger_that_has_counted_for_years_finds_the_same_cycles() -> None:

@@ -34,6 +34,25 @@ def test_friction_holds_a_gentle_press_up_to_its_limit_and_no_further(told: dict
     assert settled[2300.0] == rows.STARTS > settled[3000.0]
 
 
+def test_beside_every_press_that_settles_stands_what_of_it_is_felt(told: dict[str, dict[str, object]]) -> None:
+    """The friction that holds a PHANToM up to its limit holds it still; damping a coarse sensor does not."""
+    for key, by in (
+        ("friction-limit", "stiffness_n_per_m"),
+        ("friction-limit-pressed", "stiffness_n_per_m"),
+        ("encoder", "step_m"),
+        ("velocity-filter", "samples"),
+    ):
+        figures = told[key]["figures"]
+        assert isinstance(figures, dict)
+        counts, felt, chatter = (figures[f"{what}_by_{by}"] for what in ("settled", "felt", "chatter_n"))
+        assert {at for at, count in counts.items() if count} == {at for at, index in felt.items() if index is not None}
+        assert all(span_n is None or span_n >= 0.0 for span_n in chatter.values())
+        assert "felt" in str(told[key]["model"])
+    figures = told["velocity-filter"]["figures"]
+    assert isinstance(figures, dict)
+    assert figures["felt_by_samples"]["1"] < 1.0
+
+
 def test_a_device_without_friction_contradicts_the_friction_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(rows.PHANTOM, "coulomb_n", 0.0)
     assert not rows.friction_limit(stiffnesses=(100.0, 2000.0, 4000.0)).agrees

@@ -18,12 +18,14 @@ from numba import njit
 
 from hapticd import plugins
 from hapticd.config.walls import WallConfig
+from hapticd.offline.felt import WINDOW_S
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import judge
 from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point
 from hapticd.simulation.compiler.compile import OPTIONS, compiled
 from hapticd.simulation.compiler.threads import in_threads
 from hapticd.simulation.options import SimulationOptions
+from hapticd_studies.felt_ends import felt_ends
 
 LAW = "energy-cycle"
 PERIOD_S = 1e-3
@@ -65,6 +67,7 @@ class LongRun:
         adapted_n_s_per_m: the same, of this law after its damping was set to 0.
         fresh_n_s_per_m: the same, of a new law.
         kept_outcome, outcome, fresh_outcome: `Outcome` on the new wall, of these three.
+        felt, chatter_n: felt index of the last second there and span of its force [N], of these three.
     """
 
     hand: str
@@ -84,6 +87,8 @@ class LongRun:
     kept_outcome: Outcome
     outcome: Outcome
     fresh_outcome: Outcome
+    felt: tuple[float, float, float]
+    chatter_n: tuple[float, float, float]
 
     @property
     def holds(self) -> bool:
@@ -143,12 +148,14 @@ def run_days(ticks: int = DAY_TICKS, progress: Callable[[int], None] | None = No
                 cycle_j=float(ledger["cycle_generated_j"]),
                 running_j=max(abs(float(ledger["_since_j"])), abs(float(arrays.law_states[at]["energy_j"]))),
                 damping_n_s_per_m=float(arrays.law_states[at]["damping_n_s_per_m"]),
-                kept_n_s_per_m=kept[at][1],
-                adapted_n_s_per_m=emptied[at][1],
-                fresh_n_s_per_m=fresh[at][1],
-                kept_outcome=kept[at][0],
-                outcome=emptied[at][0],
-                fresh_outcome=fresh[at][0],
+                kept_n_s_per_m=kept[at].damping_n_s_per_m,
+                adapted_n_s_per_m=emptied[at].damping_n_s_per_m,
+                fresh_n_s_per_m=fresh[at].damping_n_s_per_m,
+                kept_outcome=kept[at].outcome,
+                outcome=emptied[at].outcome,
+                fresh_outcome=fresh[at].outcome,
+                felt=(kept[at].felt, emptied[at].felt, fresh[at].felt),
+                chatter_n=(kept[at].chatter_n, emptied[at].chatter_n, fresh[at].chatter_n),
             )
         )
     return days
@@ -158,15 +165,23 @@ def _device(force: dict[str, Any], **keys: Any) -> SimulationOptions:
     return SimulationOptions.model_validate({"model": "omega7", "hand": {"force": force}, **keys})
 
 
-def _examined(old: Any) -> list[list[tuple[Outcome, float]]]:
-    """Outcome and damping of new laws, old ones, and old ones without their damping, dropped onto a stiffer wall."""
+@dataclass(frozen=True, slots=True)
+class _Exam:
+    outcome: Outcome
+    damping_n_s_per_m: float
+    felt: float
+    chatter_n: float
+
+
+def _examined(old: Any) -> list[list[_Exam]]:
+    """The end of new laws, old ones, and old ones without their damping, dropped onto a stiffer wall."""
     law, criterion = plugins.law(LAW), Criterion()
     device = _device({"profile": "constant", "newton": -3.0}, initial_position_m=5e-3)
     point = Point(device, WallConfig(stiffness_n_per_m=NEW_STIFFNESS_N_PER_M), law.Params(), PERIOD_S)
     points = [point] * len(HANDS)
     found = []
     for aged, emptied in ((False, False), (True, False), (True, True)):
-        batch = Batch(law, points, EXAM_S, criterion.window_s)
+        batch = Batch(law, points, EXAM_S, criterion.window_s, trace_every=1, trace_last_s=WINDOW_S)
         arrays = batch.arrays()
         if aged:
             arrays.law_states[:] = old.law_states
@@ -174,9 +189,10 @@ def _examined(old: Any) -> list[list[tuple[Outcome, float]]]:
         if emptied:
             arrays.law_states["damping_n_s_per_m"] = 0.0
         batch.run_on(arrays)
-        outcomes = judge(criterion, points, batch.result(arrays))
-        damping = arrays.law_states["damping_n_s_per_m"]
-        found.append([(Outcome(int(one)), float(value)) for one, value in zip(outcomes, damping, strict=True)])
+        result = batch.result(arrays)
+        outcomes = judge(criterion, points, result)
+        ends = zip(outcomes, arrays.law_states["damping_n_s_per_m"], *felt_ends(points, result), strict=True)
+        found.append([_Exam(Outcome(int(one)), *map(float, figures)) for one, *figures in ends])
     return found
 
 

@@ -191,7 +191,8 @@ def _day(day: LongRun) -> Line:
     text = (
         f"{day.ticks:.4g} ticks, {day.hand}: sums to {worst:.1g}; {day.cycles_at_first} cycles in the first tenth, "
         f"{day.cycles_at_last} in the last; then on a stiffer wall {day.kept_outcome.words} with the "
-        f"{day.damping_n_s_per_m:.3g} N s/m of that day ({day.kept_n_s_per_m:.3g} at the end), and after these were "
-        f"set to 0 {day.outcome.words} with {day.adapted_n_s_per_m:.3g}"
+        f"{day.damping_n_s_per_m:.3g} N s/m of that day ({day.kept_n_s_per_m:.3g} at the end; felt {day.felt[0]:.2g}, "
+        f"force spans {day.chatter_n[0]:.2g} N), and after these were set to 0 {day.outcome.words} with "
+        f"{day.adapted_n_s_per_m:.3g} (felt {day.felt[1]:.2g}, force spans {day.chatter_n[1]:.2g} N)"
     )
     return Line("a day", text, day.holds)

@@ -2,20 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hapticd import plugins
 from hapticd.config.walls import WallConfig
-from hapticd.offline.felt import WINDOW_S, felt_index
+from hapticd.offline.felt import WINDOW_S
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import aimed, judge
-from hapticd.simulation.batch import TRACE_COLUMNS, Batch, Point
+from hapticd.simulation.batch import Batch, BatchResult, Point
 from hapticd.simulation.options import SimulationOptions
+from hapticd_studies.felt_ends import felt_ends
 
 HIGHEST_START_M = 2e-3
-_POSITION = TRACE_COLUMNS.index("x_m")
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """How presses end.
+
+    Attributes:
+        count: how many settle.
+        felt: median felt index of the last second of those; None: there are none.
+        chatter_n: median span of their force in that second [N].
+    """
+
+    count: int
+    felt: float | None
+    chatter_n: float | None
+
+    @property
+    def words(self) -> str:
+        """What of their rest is felt, for people."""
+        if self.felt is None:
+            return "none settles"
+        return f"felt {self.felt:.2f}, force spans {self.chatter_n:.2f} N"
 
 
 def points(
@@ -41,16 +64,20 @@ def points(
     return made
 
 
-def settled(presses: list[Point], duration_s: float) -> int:
-    """How many settle.
+def settled(presses: list[Point], duration_s: float) -> Settled:
+    """How many settle, and what of their rest is felt.
 
     Args:
         presses: from `points`.
         duration_s: simulated time of each [s].
     """
     criterion = Criterion()
-    result = Batch(plugins.law("none"), presses, duration_s, criterion.window_s, ledger=False).run()
-    return int((judge(criterion, presses, result) == Outcome.SETTLED).sum())
+    result = _run(presses, duration_s, criterion.window_s)
+    held = judge(criterion, presses, result) == Outcome.SETTLED
+    if not held.any():
+        return Settled(0, None, None)
+    felt_each, chatter_n = felt_ends(presses, result)
+    return Settled(int(held.sum()), float(np.median(felt_each[held])), float(np.median(chatter_n[held])))
 
 
 def felt(presses: list[Point], duration_s: float) -> float:
@@ -60,11 +87,9 @@ def felt(presses: list[Point], duration_s: float) -> float:
         presses: from `points`.
         duration_s: simulated time of each [s].
     """
-    result = Batch(plugins.law("none"), presses, duration_s, WINDOW_S, ledger=False, trace_every=1).run()
-    period_s = presses[0].period_s
-    last = round(WINDOW_S / period_s)
-    found = [
-        felt_index(trace[-last:, _POSITION], period_s) if finite else np.inf
-        for trace, finite in zip(result.trace, result.finite, strict=True)
-    ]
-    return float(np.median(found))
+    return float(np.median(felt_ends(presses, _run(presses, duration_s, WINDOW_S))[0]))
+
+
+def _run(presses: list[Point], duration_s: float, window_s: float) -> BatchResult:
+    law = plugins.law("none")
+    return Batch(law, presses, duration_s, window_s, trace_every=1, ledger=False, trace_last_s=WINDOW_S).run()

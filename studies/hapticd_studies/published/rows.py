@@ -15,7 +15,7 @@ from hapticd.config.walls import WallConfig
 from hapticd.simulation.options import Flexible
 from hapticd_studies.boundaries import Loop, is_stable, linear_limit, spring_limit, stable_limit
 from hapticd_studies.published.finding import Finding
-from hapticd_studies.published.presses import felt, points, settled
+from hapticd_studies.published.presses import Settled, felt, points, settled
 
 PERIOD_S = 1e-3
 STARTS = 15
@@ -59,11 +59,11 @@ def friction_limit(hand_n: float = 0.3, stiffnesses: Sequence[float] = _STIFFNES
         "friction-limit",
         DIOLAITI,
         f"held by friction up to 2 f_c/step = {limit:.0f} N/m, where viscous friction alone allows {viscous:.0f}",
-        f"pressed with {hand_n:g} N all of {STARTS} starts to 2 mm settle up to {edge:.0f} N/m, "
-        f"{counts[max(k for k in stiffnesses if k <= limit)]} of them at the limit, {counts[stiffnesses[-1]]} at "
-        f"{stiffnesses[-1]:.0f}",
+        f"pressed with {hand_n:g} N all of {STARTS} starts to 2 mm settle up to {edge:.0f} N/m"
+        f"{_felt_at(counts, edge)}, {counts[max(k for k in stiffnesses if k <= limit)].count} of them at the limit, "
+        f"{counts[stiffnesses[-1]].count} at {stiffnesses[-1]:.0f}",
         10.0 * viscous < edge and 0.5 * limit <= edge <= 1.2 * limit,
-        {"limit_n_per_m": limit, "settled_by_stiffness_n_per_m": counts, "starts": STARTS, "hand_n": hand_n},
+        {"limit_n_per_m": limit, "starts": STARTS, "hand_n": hand_n, **_ends(counts, "stiffness_n_per_m")},
     )
 
 
@@ -76,10 +76,10 @@ def friction_limit_pressed(hand_n: float = 1.0, stiffnesses: Sequence[float] = _
         "friction-limit-pressed",
         DIOLAITI,
         f"the limit of {limit:.0f} N/m knows no hand force",
-        f"pressed with {hand_n:g} N all starts settle up to {edge:.0f} N/m only: friction holds a device near rest "
-        "and no other",
+        f"pressed with {hand_n:g} N all starts settle up to {edge:.0f} N/m only{_felt_at(counts, edge)}: friction "
+        "holds a device near rest and no other",
         0.5 * limit <= edge,
-        {"limit_n_per_m": limit, "settled_by_stiffness_n_per_m": counts, "starts": STARTS, "hand_n": hand_n},
+        {"limit_n_per_m": limit, "starts": STARTS, "hand_n": hand_n, **_ends(counts, "stiffness_n_per_m")},
     )
 
 
@@ -237,11 +237,12 @@ def rate_takes_damping(resolution_m: float = 3e-5) -> Finding:
 
 def encoder_keeps_limit() -> Finding:
     """The step of the sensor leaves the stiffness limit where it is; coarse ones feel gritty."""
-    limits, grit = {}, {}
+    limits, grit, ends = {}, {}, {}
     for step_m in (1e-6, 1e-5, 1e-4):
         device = {"mass_kg": 0.25, "viscous_n_s_per_m": 4.0, "resolution_m": step_m, "max_force_n": 0.0}
         counts = _settled_by_stiffness(device, 30.0, (500.0, 1000.0, 2000.0, 4000.0, 6000.0, 7000.0, 7600.0, 8400.0))
         limits[step_m] = _edge(counts)
+        ends[step_m] = counts[limits[step_m]]
         wall = WallConfig(stiffness_n_per_m=2000.0, damping_n_s_per_m=50.0)
         grit[step_m] = felt(points(device, wall, 2.03, 5, PERIOD_S), 4.0)
     kept = max(limits.values()) <= 1.2 * min(limits.values())
@@ -251,33 +252,36 @@ def encoder_keeps_limit() -> Finding:
         "the encoder's step leaves the limit where it is; coarse ones feel gritty",
         "steps of 1, 10, 100 um: all starts settle up to "
         + ", ".join(f"{limit / 1e3:.1f}" for limit in limits.values())
-        + " kN/m; felt at 50 N s/m "
+        + " kN/m ("
+        + "; ".join(one.words for one in ends.values())
+        + "); felt at 50 N s/m "
         + ", ".join(f"{index:.1f}" for index in grit.values())
         + " times the threshold; without friction a coarse step keeps a swing of some steps alive that the rule of two "
         "steps calls unsettled",
         kept and grit[1e-4] > 3.0 * max(1.0, grit[1e-6]),
-        {"limit_by_step_m": limits, "felt_by_step_m": grit},
+        {"limit_by_step_m": limits, "gritty_by_step_m": grit, **_ends(ends, "step_m")},
     )
 
 
 def velocity_filter() -> Finding:
     """Filtering the velocity changes the region."""
     device = {"mass_kg": 0.25, "viscous_n_s_per_m": 4.0, "resolution_m": 0.0, "max_force_n": 0.0}
-    limits = {}
+    limits, ends = {}, {}
     for samples in (1, 8):
         counts = {
             b: settled(points(device, _wall(2000.0, b), 2.03, 3, PERIOD_S, samples), 4.0)
             for b in (40.0, 80.0, 160.0, 320.0)
         }
-        limits[samples] = max((b for b, count in counts.items() if count == 3), default=0.0)
+        limits[samples] = max((b for b, one in counts.items() if one.count == 3), default=0.0)
+        ends[samples] = counts.get(limits[samples], Settled(0, None, None))
     return Finding(
         "velocity-filter",
         BROWN,
         "filtering the velocity changes the stable region",
-        f"the largest wall damping that settles is {limits[1]:.0f} N s/m with a difference over one sample and "
-        f"{limits[8]:.0f} over eight",
+        f"the largest wall damping that settles is {limits[1]:.0f} N s/m with a difference over one sample "
+        f"({ends[1].words}) and {limits[8]:.0f} over eight ({ends[8].words})",
         limits[1] != limits[8],
-        {"damping_by_samples": limits},
+        {"damping_by_samples": limits, **_ends(ends, "samples")},
     )
 
 
@@ -303,15 +307,28 @@ def _phantom_limit(mode: Flexible | None, hand: float = 0.0, spring: float = 0.0
     return stable_limit(loop)
 
 
-def _settled_by_stiffness(device: dict[str, Any], hand_n: float, stiffnesses: Sequence[float]) -> dict[float, int]:
+def _settled_by_stiffness(device: dict[str, Any], hand_n: float, stiffnesses: Sequence[float]) -> dict[float, Settled]:
     return {k: settled(points(device, _wall(k), hand_n, STARTS, PERIOD_S), 20.0) for k in stiffnesses}
 
 
-def _edge(counts: dict[float, int]) -> float:
+def _felt_at(counts: dict[float, Settled], edge: float) -> str:
+    return f" ({counts[edge].words})" if edge in counts else ""
+
+
+def _ends(counts: dict[Any, Settled], by: str) -> dict[str, object]:
+    """As figures: how many settle, and what of them is felt and chatters."""
+    return {
+        f"settled_by_{by}": {at: one.count for at, one in counts.items()},
+        f"felt_by_{by}": {at: one.felt for at, one in counts.items()},
+        f"chatter_n_by_{by}": {at: one.chatter_n for at, one in counts.items()},
+    }
+
+
+def _edge(counts: dict[float, Settled]) -> float:
     """The stiffest wall up to which all starts settle; 0 when not even on the softest."""
     edge = 0.0
-    for stiffness, count in counts.items():
-        if count < STARTS:
+    for stiffness, one in counts.items():
+        if one.count < STARTS:
             break
         edge = stiffness
     return edge
