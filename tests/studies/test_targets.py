@@ -12,11 +12,13 @@ import pytest
 from hapticd.cli import main
 from hapticd.offline.outcome import Criterion
 from hapticd_studies.law_spec import LawSpec, parse_laws
+from hapticd_studies.targets import hindsight
 from hapticd_studies.targets.hands import softening, taking_over
+from hapticd_studies.targets.missed import markdown, missed
 from hapticd_studies.targets.plan import Size, TargetsPlan
 from hapticd_studies.targets.presses import noisy
 from hapticd_studies.targets.report import front_of, targets_of
-from hapticd_studies.targets.table import Reached
+from hapticd_studies.targets.table import LATER, Reached, interval, known_beforehand
 
 TINY = Size(pressed=8, moved=7, moved_s=3.0, based=7, based_s=12.0, starts=2)
 
@@ -38,6 +40,52 @@ def test_a_target_is_met_from_its_side_only() -> None:
     assert Reached("damping", 1.5, False, 1.5, 10).met
     assert not Reached("damping", 1.5, False, 1.6, 10).met
     assert not Reached("settling", 1.5, False, math.nan, 10).met
+
+
+@pytest.mark.parametrize(("share", "of", "low", "high"), [(0.5, 10, 0.2366, 0.7634), (1.0, 100, 0.9630, 1.0)])
+def test_a_share_stands_with_wilsons_interval(share: float, of: int, low: float, high: float) -> None:
+    assert interval(share, of) == pytest.approx((low, high), abs=1e-4)
+
+
+def test_what_reaches_a_missed_target_is_said_with_what_it_loses() -> None:
+    def rows(held: float, pulls: float, taps: float) -> list[Reached]:
+        return [
+            Reached("held", 99.0, True, held, 100),
+            Reached("pulls", 2.0, False, pulls, 100),
+            Reached("taps", 1.5, False, taps, 100),
+            Reached(f"taps{LATER}", 1.5, False, 9.0, 100),
+        ]
+
+    laws = {
+        "default": rows(98.0, 0.1, 1.0),
+        "firm": rows(100.0, 30.0, 20.0),
+        "blunt": rows(99.5, 0.2, 9.0),
+        "weak": rows(90.0, 0.0, 0.5),
+        "mute": rows(99.9, math.nan, 9.0),
+        "known beforehand": [Reached("held", 99.0, True, 98.9, 100)],
+    }
+    (held,) = missed(laws)
+    assert [one.law for one in held.others] == ["mute", "blunt", "firm", "known beforehand", "weak"]
+    assert [one.what for one in held.others[2].costs] == ["pulls", "taps"]
+    assert held.says == "3 of 5 reach it, and each loses what the default reaches"
+    assert "| `firm` | 100 | pulls: 30, not 0.1; taps: 20, not 1 |" in markdown([held])
+    (free,) = missed({"default": rows(98.0, 0.1, 1.0), "better": rows(99.0, 0.1, 1.0)})
+    assert free.says == "better reaches it, and nothing that the default reaches is lost"
+    (none,) = missed({"default": rows(98.0, 0.1, 1.0), "weak": rows(97.0, 0.1, 1.0)})
+    assert none.says == "none of 1 reaches it"
+
+
+@pytest.mark.nightly
+def test_dampers_chosen_for_each_device_are_calm_or_fast_and_never_both() -> None:
+    plan = TargetsPlan(9, Size(10, 7, 2.0, 7, 2.0, 2), [law("damper")], Criterion(), ("moved", "hindsight"))
+    job = plan.job()
+    tables = plan.tables([job.work(job.spec, block, 1) for block in range(len(job.sizes))])
+    assert "hindsight" not in tables[1]
+    least, fastest = ({one.what: one.reached for one in rows} for rows in known_beforehand(plan, tables[0]).values())
+    assert tuple(known_beforehand(plan, tables[0])) == hindsight.LABELS
+    settling, base = "settling over the best damper's, hard arrival", "base after ten minutes of hands within need [%]"
+    assert fastest[settling] == 1.0 < least[settling]
+    assert least[base] == 100.0 > fastest[base]
 
 
 def test_the_devices_with_noise_have_no_delay() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -11,8 +11,9 @@ from rich.console import Console
 from hapticd.errors import ConfigError
 from hapticd_studies.grid.output import require_cluster, require_extra, require_folder, write
 
-_TARGETS = ("targets.json",)
+_TARGETS = ("targets.json", "targets.md")
 _FRONT = ("front.json", "front.png")
+_MISSED = ("missed.json", "missed.md")
 
 
 def command(
@@ -24,6 +25,10 @@ def command(
     front: Annotated[
         bool, typer.Option("--front", help="ring-damping's settings and constant dampers: what excludes what.")
     ] = False,
+    missed: Annotated[
+        bool,
+        typer.Option("--missed", help="What reaches each target that ring-damping misses, and what that loses."),
+    ] = False,
     output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("targets"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
@@ -32,9 +37,10 @@ def command(
     """Hold laws against the targets of the default law: what holds, what it costs, what is felt.
 
     With --front, settings of ring-damping and constant dampers over the same moving hands: settling against damping
-    and against pulls, with a picture. Interrupted, the same command goes on where it was.
+    and against pulls, with a picture. With --missed, other settings, other laws and dampers chosen for each device, at
+    each target that the default misses. Interrupted, the same command goes on where it was.
 
-    Example: hapticd study targets --share 0.15    hapticd study targets --front --share 0.15
+    Example: hapticd study targets --share 0.15    hapticd study targets --missed --share 0.05
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)
@@ -42,28 +48,38 @@ def command(
         raise ConfigError(f"--share {share:g}: must be from 0.01 to 100")
     if not 0 <= seed < 10**18:
         raise ConfigError(f"--seed {seed}: must be 0 or more and less than 1e18")
-    files = _FRONT if front else _TARGETS
+    if front and missed:
+        raise ConfigError("--front and --missed: one at a time")
+    files = _FRONT if front else _MISSED if missed else _TARGETS
     require_folder(output, files)
 
     from hapticd.offline.outcome import Criterion
     from hapticd_studies.grid.run import kept, run
     from hapticd_studies.law_spec import parse_laws
+    from hapticd_studies.targets import missed as against
     from hapticd_studies.targets.front import FRONT, draw
-    from hapticd_studies.targets.plan import MOVED_ONLY, TargetsPlan, size_of
-    from hapticd_studies.targets.report import front_of, front_table, json_of, table, targets_of
+    from hapticd_studies.targets.plan import MOVED_ONLY, USUAL, WITH_HINDSIGHT, TargetsPlan, size_of
+    from hapticd_studies.targets.report import front_of, front_table, json_of, markdown, table, targets_of
+    from hapticd_studies.targets.table import known_beforehand
 
-    chosen = parse_laws(FRONT if front else laws, {})
-    plan = TargetsPlan(seed, size_of(share), chosen, Criterion(), MOVED_ONLY if front else ())
+    chosen = parse_laws(FRONT if front else against.LAWS if missed else laws, {})
+    only = MOVED_ONLY if front else WITH_HINDSIGHT if missed else USUAL
+    plan = TargetsPlan(seed, size_of(share), chosen, Criterion(), only)
     job = plan.job()
     with kept(job, output / "targets.journal", fresh) as journal:
         tables = plan.tables(run(job, journal, "targets", cluster))
         if front:
             points = front_of(plan, tables)
             content = [json_of(plan, points), draw(points)]
-            shown = front_table(points)
+            shown: Any = front_table(points)
+        elif missed:
+            found = targets_of(plan, tables)
+            lost = against.missed(found | known_beforehand(plan, tables[0]))
+            shown = against.markdown(lost)
+            content = [json_of(plan, found, lost), shown.encode()]
         else:
             found = targets_of(plan, tables)
-            content = [json_of(plan, found)]
+            content = [json_of(plan, found), markdown(plan, found).encode()]
             shown = table(plan, found)
         for file, one in zip(files, content, strict=True):
             write(output / file, one)
@@ -71,5 +87,5 @@ def command(
         typer.echo((output / files[0]).read_text(), nl=False)
         return
     console = Console(highlight=False)
-    console.print(shown)
+    console.print(shown, markup=False, soft_wrap=missed)
     console.print(f"{output}: {', '.join(files)}", soft_wrap=True, markup=False)

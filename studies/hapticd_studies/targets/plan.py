@@ -14,7 +14,7 @@ from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.robustness import devices as robustness
-from hapticd_studies.targets import hands, presses
+from hapticd_studies.targets import hands, hindsight, presses
 from hapticd_studies.transparency.devices import draw
 from hapticd_studies.transparency.references import references
 from hapticd_studies.transparency.runs import rows
@@ -45,8 +45,12 @@ class Size:
     starts: int
 
 
+USUAL = ("pressed", "noisy", "known", "moved", "stiffened", "based", "softening", "taking over")
+"""The parts that the targets ask for."""
 MOVED_ONLY = ("moved",)
 """The parts of a front."""
+WITH_HINDSIGHT = (*USUAL, "hindsight")
+"""The targets, and dampers chosen for each device."""
 
 
 def size_of(share: float) -> Size:
@@ -68,13 +72,13 @@ class Part:
     Attributes:
         cells: how many rows it has.
         most: of them in one block.
-        of_law: the rows of some cells under a law.
+        of_law: the rows of some cells under a law, or none.
         of_dampers: those of the constant dampers, or none.
     """
 
     cells: int
     most: int
-    of_law: Callable[[Sequence[int], LawSpec, int | None], list[Row]]
+    of_law: Callable[[Sequence[int], LawSpec, int | None], list[Row]] | None = None
     of_dampers: Callable[[Sequence[int], int | None], list[Row]] | None = None
 
 
@@ -87,14 +91,14 @@ class TargetsPlan:
         size: how much.
         laws: which are held against the targets.
         criterion: what still and in place mean.
-        only: the parts that are run; none named: all.
+        only: the parts that are run.
     """
 
     seed: int
     size: Size
     laws: Sequence[LawSpec]
     criterion: Criterion
-    only: tuple[str, ...] = ()
+    only: tuple[str, ...] = USUAL
 
     def job(self) -> Job:
         """Every law on every part, the constant dampers first."""
@@ -121,8 +125,8 @@ class TargetsPlan:
         return _cut(parts(self.seed, self.size, self.criterion, self.only), len(self.laws))
 
 
-def parts(seed: int, size: Size, criterion: Criterion, only: Sequence[str] = ()) -> dict[str, Part]:
-    """The evidence by name: all, or only what is named."""
+def parts(seed: int, size: Size, criterion: Criterion, only: Sequence[str]) -> dict[str, Part]:
+    """The evidence that is named, by name."""
 
     def pressed(cells: Sequence[int]) -> list[robustness.Device]:
         return [robustness.draw(seed, index) for index in cells]
@@ -181,8 +185,13 @@ def parts(seed: int, size: Size, criterion: Criterion, only: Sequence[str] = ())
             len(TAKEOVER_FORCES_N),
             lambda cells, law, threads: hands.taking_over([TAKEOVER_FORCES_N[at] for at in cells], law, threads),
         ),
+        "hindsight": Part(
+            size.moved,
+            20,
+            of_dampers=lambda cells, threads: hindsight.chosen(moved(cells), size.moved_s, criterion, threads),
+        ),
     }
-    return {name: part for name, part in every.items() if not only or name in only}
+    return {name: every[name] for name in only}
 
 
 def _cut(found: dict[str, Part], laws: int) -> list[tuple[int, str, tuple[int, ...]]]:
@@ -191,7 +200,7 @@ def _cut(found: dict[str, Part], laws: int) -> list[tuple[int, str, tuple[int, .
         (law, name, block_sizes(part.cells, part.most))
         for law in range(1 + laws)
         for name, part in found.items()
-        if law or part.of_dampers is not None
+        if (part.of_law if law else part.of_dampers) is not None
     ]
 
 
@@ -200,7 +209,7 @@ def _block(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
     for law, name, sizes in _cut(found, len(spec["laws"])):
         if block < len(sizes):
             cells, part = list(block_cells(sizes, block)), found[name]
-            if law:
+            if law and part.of_law is not None:
                 return part.of_law(cells, LawSpec(**spec["laws"][law - 1]), threads)
             assert part.of_dampers is not None
             return part.of_dampers(cells, threads)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -13,12 +14,16 @@ from rich.table import Table
 
 from hapticd.version import __version__
 from hapticd_studies.grid.output import as_json
+from hapticd_studies.targets.missed import Missed
 from hapticd_studies.targets.plan import TargetsPlan
 from hapticd_studies.targets.table import Reached, reached
 from hapticd_studies.transparency.devices import draw
 from hapticd_studies.transparency.summary import summary
 
 Array = npt.NDArray[np.float64]
+
+FEW = 500
+"""Shares of fewer random devices stand with their interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +90,26 @@ def table(plan: TargetsPlan, found: dict[str, list[Reached]]) -> Table:
     return shown
 
 
+def markdown(plan: TargetsPlan, found: dict[str, list[Reached]]) -> str:
+    """The same as a table of a page, with the 95 % intervals of shares of fewer than `FEW` random devices."""
+    lines = [
+        f"| target | asked | of | {' | '.join(f'`{law.label}`' for law in plan.laws)} |",
+        f"|---|---|---|{'---|' * len(plan.laws)}",
+    ]
+    for row in zip(*found.values(), strict=True):
+        first = row[0]
+        asked = f"{'at least' if first.at_least else 'at most'} {first.asked:g}"
+        lines.append(f"| {first.what} | {asked} | {first.of} | {' | '.join(_cell(one) for one in row)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(one: Reached) -> str:
+    value = "-" if math.isnan(one.reached) else f"{one.reached:.3g}"
+    if one.of < FEW and not math.isnan(one.low):
+        value += f" ({one.low:.3g}-{one.high:.3g})"
+    return f"**{value}**" if one.met else value
+
+
 def front_table(points: Sequence[Traded]) -> Table:
     """For the terminal."""
     shown = Table(box=None, pad_edge=False)
@@ -96,12 +121,13 @@ def front_table(points: Sequence[Traded]) -> Table:
     return shown
 
 
-def json_of(plan: TargetsPlan, found: dict[str, list[Reached]] | list[Traded]) -> bytes:
-    """For programs."""
+def json_of(plan: TargetsPlan, found: dict[str, list[Reached]] | list[Traded], against: Sequence[Missed] = ()) -> bytes:
+    """For programs; `against`: what stands against the targets that the first law misses."""
     content: Any = (
         [asdict(one) for one in found]
         if isinstance(found, list)
         else {law: [one.declared() for one in rows] for law, rows in found.items()}
     )
+    more = {"missed": [one.declared() for one in against]} if against else {}
     head = {"study": "targets", "hapticd": __version__, "seed": plan.seed, "size": asdict(plan.size)}
-    return as_json({**head, "criterion": plan.criterion.declared(), "laws": content})
+    return as_json({**head, "criterion": plan.criterion.declared(), "laws": content, **more})

@@ -80,13 +80,27 @@ def calm(devices: Sequence[Held], damping: Array, criterion: Criterion, threads:
     return every
 
 
+def fastest_damping(devices: Sequence[Held], how: Arrival, criterion: Criterion, threads: int | None = None) -> Array:
+    """The constant damper of those tried that settles each device soonest; NaN: none does [N s/m]."""
+    settled_s = _settled_s(devices, how, criterion, threads)
+    ratios = np.argmin(np.where(np.isnan(settled_s), math.inf, settled_s), axis=0)
+    found = [_of_ratio(device, _RATIOS[int(at)]) for device, at in zip(devices, ratios, strict=True)]
+    return np.where(np.isnan(settled_s).all(axis=0), math.nan, np.array(found))
+
+
 def _best_s(devices: Sequence[Held], how: Arrival, criterion: Criterion, threads: int | None) -> Array:
     """The shortest settling time under any of the damping ratios tried; NaN: none settles."""
+    best: Array = np.fmin.reduce(_settled_s(devices, how, criterion, threads))
+    return best
+
+
+def _settled_s(devices: Sequence[Held], how: Arrival, criterion: Criterion, threads: int | None) -> Array:
+    """Settling times, a row a damping ratio; NaN: it does not settle."""
     law = plugins.law("damper")
     points = [_point(how, device, _of_ratio(device, ratio)) for ratio in _RATIOS for device in devices]
     result = Batch(law, points, PRESS_S, criterion.window_s, ledger=False).run(threads)
-    best: Array = np.fmin.reduce(result.settled_s.reshape(len(_RATIOS), -1))
-    return best
+    settled: Array = result.settled_s.reshape(len(_RATIOS), -1)
+    return settled
 
 
 def _of_ratio(device: Held, ratio: float) -> float:
