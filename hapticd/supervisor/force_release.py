@@ -73,6 +73,8 @@ class ForceRelease:
         if self._helper.poll() is not None:  # somebody has killed it
             self.close()
             self._helper, self._ready = _start(self._config), False
+        with contextlib.suppress(ProcessLookupError):
+            self._helper.send_signal(signal.SIGCONT)  # somebody may have stopped it
         if not self.wait_ready():
             return "the helper that takes the force away did not start; the device's own watchdog has to release it"
         try:

@@ -41,6 +41,13 @@ def test_a_helper_that_somebody_killed_is_replaced(release: ForceRelease) -> Non
     assert release.release() == "the device is without force"
 
 
+def test_a_helper_that_somebody_stopped_goes_on(release: ForceRelease) -> None:
+    """It was said that the device did not answer, and the device kept its force."""
+    assert release.wait_ready()
+    os.kill(release._helper.pid, signal.SIGSTOP)
+    assert release.release() == "the device is without force"
+
+
 def test_a_helper_that_cannot_start_is_told(release: ForceRelease, monkeypatch: pytest.MonkeyPatch) -> None:
     release.close()
     monkeypatch.setattr("sys.executable", "/bin/false")
