@@ -11,7 +11,7 @@ from hapticd_studies.targets.report import Traded
 _RING = (
     "",
     ":pull_after=0",
-    ":pull_after=1",
+    ":pull_after=2",
     ":least_brake_ratio=0.05",
     ":least_brake_ratio=0.6",
     ":least_brake_ratio=0.6:pull_after=0",
