@@ -6,8 +6,15 @@ a client does and a wall does not:
     - a spring has a damping of k times 15 ms before anything has swung: a body behind it that has once been thrown
       about by a delay does not come down again, however much the device is damped then;
     - what the spring holds at a cycle's end is no gain: its target moves;
-    - each cycle that generates nothing takes a twentieth off, and a spring that comes into force anew begins anew;
-    - the velocity is smoothed, since 0.1 kN s/m on one count of the position is a kick.
+    - a cycle ends too when a force comes to nothing: a wall that is so late that it only ever pushes along with the
+      motion never takes anything, and the energy then never rises;
+    - a force learns fast: the second cycle in a row that generates adds twice. A spring learns slowly: two cycles are
+      let pass after each that adds, and after it came into force, since the body behind it goes on swinging from
+      before, and a device that is held too fast leaves the body to swing against it;
+    - each cycle that generates nothing takes a twentieth off, but not below what was too little before; a spring that
+      comes into force anew begins anew;
+    - damping comes in 10 ms, and the velocity is smoothed: 0.1 kN s/m on one count of the position is a kick, and so is
+      a damping that comes at once.
 
 docs/couplings.md has the figures.
 """
@@ -30,10 +37,14 @@ WINDOW = 2  # samples of falling, then of rising energy at a cycle's end
 SMALL_COUNTS = 10.0  # a cycle that travels less, in counts of the position, is noise as much as motion
 SMALL_LEAKS = 4.0  # damping at most this many times what was generated in a small cycle
 MEMORY = 0.998  # share of the felt mass's evidence that a new sample leaves standing
-SHARE_OF_MASS = 0.6  # most damping in m/dt: a sampled damper is itself unstable from 2
+SHARE_OF_MASS = 1.0  # most damping in m/dt: a sampled damper is itself unstable from 2, smoothed velocity or not
 LATE_SHARE_OF_MASS = 0.35  # the same where the device applies forces one sample late: from 0.83
-MOST = 200.0  # most damping whatever was felt: a hand that moves is easily taken for a mass [N s/m]
+MOST = 300.0  # most damping whatever was felt: a hand that moves is easily taken for a mass [N s/m]
 NEW_SPEED = 0.5  # share of the newest sample in the velocity that is damped
+EASE_S = 0.01  # in which a damping comes into force, to 63 %: at 1 m/s at once it is a jump of its whole force [s]
+AGAIN = 2.0  # times what is missing that a force's second cycle in a row adds: one swing of it takes half a second
+SPRING_WAITS = 2.0  # cycles of a spring that are let pass after a change: what swings there began before it
+FLOOR_FALL = 0.1  # what was too little is forgotten so much slower than what was added beyond it
 
 
 class Params(LawParams):
@@ -54,7 +65,11 @@ class Params(LawParams):
 class State(CycleSums, FeltFields):
     """What is remembered of one axis of a port."""
 
-    damping_n_s_per_m: float  # in force until the next cycle ends
+    damping_n_s_per_m: float  # goes into force until the next cycle ends
+    eased_n_s_per_m: float  # in force
+    floor_n_s_per_m: float  # was too little
+    again: float  # times what is missing that the next cycle adds
+    waits: float  # cycles that are let pass
     velocity_m_per_s: float  # smoothed
     was_in_contact: bool
     period_s: float  # dt, smoothed: one overrun is not another sampling rate
@@ -64,6 +79,8 @@ class State(CycleSums, FeltFields):
 def start(state: Any, params: Any, snapshot: Any) -> None:
     """Take over: damping that was reached and energy that was not dissipated count; a credit does not."""
     state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
+    state.eased_n_s_per_m = state.damping_n_s_per_m
+    _forget(state)
     state.velocity_m_per_s = 0.0
     know_nothing(state, False)
     state.was_in_contact = False
@@ -82,10 +99,13 @@ def step(state: Any, params: Any, tick: Any) -> float:
         state.lowest_m = tick.x_m
         state.highest_m = tick.x_m
         state.damping_n_s_per_m = 0.0
+        _forget(state)
+        state.waits = SPRING_WAITS
     state.was_in_contact = tick.in_contact
 
     _count_energy(state, tick)
-    ended = cycle_ended(state, state.energy_j, tick.in_contact, WINDOW, WINDOW)
+    pushes = tick.in_contact and tick.contact_n != 0.0
+    ended = cycle_ended(state, state.energy_j, pushes, WINDOW, WINDOW)
     if state.window_rises == 0 and (not ended or state.window_minimum_j == state.energy_j):
         state.candidate_motion_m2_per_s = state.motion_m2_per_s
         state.candidate_stored_j = 0.5 * abs(tick.x_m * tick.spring_n)
@@ -95,10 +115,13 @@ def step(state: Any, params: Any, tick: Any) -> float:
         _end_cycle(state, params, tick)
     _bound(state, params, tick)
     if not tick.in_contact:
+        state.eased_n_s_per_m = 0.0
         state.velocity_m_per_s = 0.0
         return 0.0
     state.velocity_m_per_s += NEW_SPEED * (tick.velocity_m_per_s - state.velocity_m_per_s)
-    force_n: float = tick.contact_n - state.damping_n_s_per_m * state.velocity_m_per_s
+    share = tick.dt_s / (EASE_S + tick.dt_s)
+    state.eased_n_s_per_m += share * (state.damping_n_s_per_m - state.eased_n_s_per_m)
+    force_n: float = tick.contact_n - state.eased_n_s_per_m * state.velocity_m_per_s
     return force_n
 
 
@@ -121,13 +144,35 @@ def _end_cycle(state: Any, params: Any, tick: Any) -> None:
         missing = _bounded(generated_j / motion)  # eq. 8
         if missing > 0.0 and state.highest_m - state.lowest_m < SMALL_COUNTS * tick.resolution_m:
             missing = max(0.0, min(missing, SMALL_LEAKS * missing - state.damping_n_s_per_m))
-        if missing > 0.0:
-            state.damping_n_s_per_m += missing
+        if state.waits > 0.0:
+            state.waits -= 1.0
+        elif missing > 0.0:
+            _add(state, missing, tick.spring_n != 0.0)
         else:
-            state.damping_n_s_per_m *= 1.0 - params.fall
+            state.again = 1.0
+            state.floor_n_s_per_m *= 1.0 - FLOOR_FALL * params.fall
+            state.damping_n_s_per_m = max(state.floor_n_s_per_m, state.damping_n_s_per_m * (1.0 - params.fall))
     end(state, tick.x_m)
     state.motion_m2_per_s -= motion
     state.candidate_motion_m2_per_s = 0.0
+
+
+def _add(state: Any, missing: float, spring: bool) -> None:
+    """What there was is too little."""
+    state.floor_n_s_per_m = max(state.floor_n_s_per_m, state.damping_n_s_per_m)
+    if spring:
+        state.damping_n_s_per_m += missing
+        state.waits = SPRING_WAITS
+    else:
+        state.damping_n_s_per_m += missing * state.again
+        state.again = AGAIN
+
+
+def _forget(state: Any) -> None:
+    """Know nothing of what was too little."""
+    state.floor_n_s_per_m = 0.0
+    state.again = 1.0
+    state.waits = 0.0
 
 
 def _bound(state: Any, params: Any, tick: Any) -> None:
