@@ -34,8 +34,9 @@ def command(
 
     Two kinds of client on the simulated omega7, in the daemon's own tick: a tool behind a coupling that is pressed on a
     table, and a wall that is sent as a raw force. First a ladder of stiffness at four rates, with and without a delay;
-    then random clients of 30 to 1000 Hz with delay, jitter, loss and pauses, held against constant dampers. Writes a
-    picture, CSV and JSON. Interrupted, the same command goes on where it was.
+    then random clients of 30 to 1000 Hz with delay, jitter, loss and pauses, held against constant dampers; what the
+    last law does not hold is told with the window of dampers that do. Writes a picture, CSV and JSON. Interrupted, the
+    same command goes on where it was.
 
     Example: hapticd study remote --output remote    hapticd study remote --replay force:1:17
     """
@@ -48,7 +49,7 @@ def command(
 
     from hapticd_studies.law_spec import parse_laws
     from hapticd_studies.remote.runs import HANDS
-    from hapticd_studies.remote.sweep import DAMPERS, LAWS, RemotePlan
+    from hapticd_studies.remote.sweep import DAMPERS, LAWS, WINDOW, RemotePlan
 
     if hand not in HANDS:
         raise ConfigError(f"--hand {hand}: must be one of {', '.join(HANDS)}")
@@ -66,10 +67,14 @@ def command(
     from hapticd_studies.grid.run import kept, run
     from hapticd_studies.remote.plot import draw
     from hapticd_studies.remote.report import LADDER_WORDS, RANDOM_WORDS, report
+    from hapticd_studies.remote.windows import WINDOW_WORDS, lost_table, windows_table
 
     require_folder(output, _FILES)
-    plan = RemotePlan(seed, min(clients, _QUICK_CLIENTS) if quick else clients, chosen, dampers, not quick, hand)
-    Console(stderr=True, highlight=False).print(f"{len(plan.cells)} runs", soft_wrap=True)
+    each = ["none", *(f"damper:damping_n_s_per_m={value}" for value in WINDOW)]
+    window = [] if quick else parse_laws(",".join(each), {})
+    count = min(clients, _QUICK_CLIENTS) if quick else clients
+    plan = RemotePlan(seed, count, chosen, dampers, window, not quick and hand == "press", hand)
+    Console(stderr=True, highlight=False).print(f"{plan.runs} runs", soft_wrap=True)
     job = plan.job()
     with kept(job, output / "remote.journal", fresh) as journal:
         found = report(plan, plan.table(run(job, journal, "remote", cluster)))
@@ -81,5 +86,10 @@ def command(
     if found.reaches:
         console.print("[bold]Stiffness that is felt [N/m][/]", found.ladder(), LADDER_WORDS, "", sep="\n")
     console.print("[bold]Random clients[/]", found.random(), RANDOM_WORDS, sep="\n")
+    if found.windows:
+        console.print("", "[bold]Windows of constant dampers[/]", windows_table(found.windows), WINDOW_WORDS, sep="\n")
+    if found.lost:
+        title = f"[bold]Not held by {found.plan.laws[-1].label}, though by a damper, and moving on[/]"
+        console.print("", title, lost_table(found.lost), sep="\n")
     console.print(f"\nOne again: hapticd study remote --replay force:{seed}:0", soft_wrap=True)
     console.print(f"{output}: {', '.join(_FILES)}", soft_wrap=True, markup=False)

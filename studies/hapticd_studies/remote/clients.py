@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from hapticd.tick.remote.update import FORCE, POSITION, VELOCITY, Update
 
-_STEP_S = 1e-4
+STEP_S = 1e-4
 """Steps within a client's own: its own mechanics are not what is tested [s]."""
 
 
@@ -59,7 +59,7 @@ class Tool(Client):
         self.stiffness_n_per_m = 1.0 / (1.0 / table_n_per_m + 1.0 / coupling_n_per_m)
         self._mass_kg = mass_kg
         self._table_n_per_m = table_n_per_m
-        self._damping_n_s_per_m = 2.0 * (mass_kg * table_n_per_m) ** 0.5
+        self.table_n_s_per_m = 2.0 * (mass_kg * table_n_per_m) ** 0.5
         self._before_n_s = 0.0
         self._x_m = self._v_m_per_s = 0.0
 
@@ -67,12 +67,12 @@ class Tool(Client):
         """Move under the mean force."""
         mean_n = (seen.impulse_n_s - self._before_n_s) / passed_s
         self._before_n_s = seen.impulse_n_s
-        steps = max(1, round(passed_s / _STEP_S))
+        steps = max(1, round(passed_s / STEP_S))
         step_s = passed_s / steps
         for _ in range(steps):
             force_n = -mean_n
             if self._x_m < 0.0:
-                force_n -= self._table_n_per_m * self._x_m + self._damping_n_s_per_m * self._v_m_per_s
+                force_n -= self._table_n_per_m * self._x_m + self.table_n_s_per_m * self._v_m_per_s
             self._v_m_per_s += force_n / self._mass_kg * step_s
             self._x_m += self._v_m_per_s * step_s
         update.said |= POSITION | VELOCITY

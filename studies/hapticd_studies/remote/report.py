@@ -14,9 +14,8 @@ from hapticd.version import __version__
 from hapticd_studies.grid.output import as_csv, as_json
 from hapticd_studies.remote.network import Network
 from hapticd_studies.remote.runs import COLUMNS, Case
-from hapticd_studies.remote.sweep import DELAYS_S, KINDS, RATES_HZ, RemotePlan
-
-Row = dict[str, float]
+from hapticd_studies.remote.sweep import DELAYS_S, KINDS, RATES_HZ, TAMED, RemotePlan
+from hapticd_studies.remote.windows import Lost, Row, Window, held, lost, windows
 
 LADDER_WORDS = (
     "the stiffest of a ladder from 50 N/m to 12.8 kN/m that is still and in place, with all below it, at the client's "
@@ -30,8 +29,6 @@ RANDOM_WORDS = (
     "same of what the client gave; both the median of all"
 )
 """What the heads of the tables mean."""
-
-TAMED = "tamed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +86,16 @@ class RemoteReport:
         rows: what became of each run, in the order of the plan's cells.
         reaches: of the ladders.
         shares: of the random clients.
+        windows: how many of them some constant damper holds, and of those each law.
+        lost: those that some constant damper holds and the last law does not.
     """
 
     plan: RemotePlan
     rows: Sequence[Row]
     reaches: Sequence[Reach]
     shares: Sequence[Shares]
+    windows: Sequence[Window]
+    lost: Sequence[Lost]
 
     def ladder(self) -> Table:
         """For the terminal: the stiffness that each rate gets."""
@@ -129,6 +130,9 @@ class RemoteReport:
                 "criterion": Criterion().declared(),
                 "ladder": [asdict(one) for one in self.reaches],
                 "random": [asdict(one) for one in self.shares],
+                "window_n_s_per_m": [law.values.get("damping_n_s_per_m", 0.0) for law in self.plan.window],
+                "windows": [asdict(one) for one in self.windows],
+                "lost": [asdict(one) for one in self.lost],
             }
         )
 
@@ -146,12 +150,11 @@ class RemoteReport:
 def report(plan: RemotePlan, rows: Sequence[Row]) -> RemoteReport:
     """Sum up a finished study."""
     rungs = len(plan.rungs)
-    return RemoteReport(plan, rows, _reaches(plan, rows[:rungs]), _shares(plan, rows[rungs:]))
-
-
-def held(row: Row) -> bool:
-    """Still and in place at the end."""
-    return row["outcome"] == Outcome.SETTLED
+    size = len(plan.all_laws) + len(plan.window)
+    each = [rows[at : at + size] for at in range(rungs, len(rows), size)]
+    return RemoteReport(
+        plan, rows, _reaches(plan, rows[:rungs]), _shares(plan, each), windows(plan, each), lost(plan, each)
+    )
 
 
 def _reaches(plan: RemotePlan, rows: Sequence[Row]) -> list[Reach]:
@@ -174,10 +177,9 @@ def _reaches(plan: RemotePlan, rows: Sequence[Row]) -> list[Reach]:
     return reaches
 
 
-def _shares(plan: RemotePlan, rows: Sequence[Row]) -> list[Shares]:
+def _shares(plan: RemotePlan, rows: Sequence[Sequence[Row]]) -> list[Shares]:
     laws = plan.all_laws
-    labels = [law.label for law in laws]
-    each = [dict(zip(labels, rows[at : at + len(laws)], strict=True)) for at in range(0, len(rows), len(laws))]
+    each = [dict(zip([law.label for law in laws], found, strict=False)) for found in rows]
     shares = []
     for at, kind in enumerate(KINDS):
         mine = each[at * plan.count : (at + 1) * plan.count]

@@ -16,6 +16,7 @@ from hapticd.config.loading import LoadedConfig, parse
 from hapticd.offline.felt import WINDOW_S, felt_index
 from hapticd.offline.outcome import Balance, Criterion, Outcome
 from hapticd.offline.rehearsal import Rehearsal
+from hapticd.simulation.options import SimulationOptions
 from hapticd.tick.remote.update import Update
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.remote.clients import Client, FeltWall, Seen, TamedWall, Tool
@@ -201,7 +202,32 @@ def run(case: Case, law: LawSpec, take: Callable[[Rehearsal], object] | None = N
         if take is not None:
             take(rehearsal)
     over = max(motion, 1e-12)
-    return [*_ended(case, rehearsal, np.array(true_m)), peak_n, step_n, drag_j / over, max(0.0, given_j) / over]
+    became = ended(case, rehearsal.model.options, period_s, np.array(true_m), rehearsal.fault, rehearsal.diverged)
+    return [*became, peak_n, step_n, drag_j / over, max(0.0, given_j) / over]
+
+
+def ended(
+    case: Case, device: SimulationOptions, period_s: float, true_m: Any, fault: str | None, diverged: bool
+) -> list[float]:
+    """The first four of `COLUMNS`.
+
+    Args:
+        case: what was run.
+        device: on which.
+        period_s: between ticks [s].
+        true_m: the device's true position by tick [m].
+        fault: why the daemon would have stopped; None: it would not.
+        diverged: the device left all bounds.
+    """
+    criterion = Criterion()
+    if diverged:
+        return [float(Outcome.DIVERGED), math.inf, math.nan, math.inf]
+    last_m = true_m[-round(criterion.window_s / period_s) :]
+    span_m, mean_m = float(np.ptp(last_m)), float(np.mean(last_m))
+    felt = felt_index(true_m[-round(WINDOW_S / period_s) :], period_s)
+    if fault is not None:
+        return [float(Outcome.STOPPED), span_m, mean_m, felt]
+    return [float(criterion.outcome(device, case.balance(), span_m, mean_m)), span_m, mean_m, felt]
 
 
 def draw(seed: int, index: int, kind: str, hand: str = "press") -> Case:
@@ -249,17 +275,3 @@ def _copy(update: Update) -> Update:
     copy.velocity_m_per_s[:] = update.velocity_m_per_s
     copy.force_n[:] = update.force_n
     return copy
-
-
-def _ended(case: Case, rehearsal: Rehearsal, true_m: Any) -> list[float]:
-    criterion = Criterion()
-    last = round(criterion.window_s / rehearsal.period_s)
-    if rehearsal.diverged:
-        return [float(Outcome.DIVERGED), math.inf, math.nan, math.inf]
-    ended = true_m[-last:]
-    span_m, mean_m = float(np.ptp(ended)), float(np.mean(ended))
-    felt = felt_index(true_m[-round(WINDOW_S / rehearsal.period_s) :], rehearsal.period_s)
-    if rehearsal.fault is not None:
-        return [float(Outcome.STOPPED), span_m, mean_m, felt]
-    outcome = criterion.outcome(rehearsal.model.options, case.balance(), span_m, mean_m)
-    return [float(outcome), span_m, mean_m, felt]
