@@ -110,7 +110,7 @@ class CompiledCase:
         _machine_code(module, tuple(sorted(_switches(self._options).items())))(
             records([plant], kinds(plant)),
             records([plant_params], kinds(plant_params)),
-            device.buffers.line,
+            np.array(device.buffers.line, float),
             self._hand_n,
             records([law_fields], state_fields(module)),
             records([params], param_kinds(module)),
