@@ -246,7 +246,11 @@ class Flood:
 
 
 def test_a_subscriber_that_never_reads_costs_the_others_nothing(daemon: Daemon, tool: RemotePort) -> None:
-    """Behind what waits for it, it loses ticks; one that reads is told what it was told without."""
+    """Behind what waits for it, it loses ticks; one that reads is told what it was told without.
+
+    The fixture's client does not read either. A thousand ticks that wait for both take 0.4 MB; the two thousand of this
+    test take 0.77 MB if all wait.
+    """
     pid = remote_pid(daemon)
     hold(tool, 0.0)
     before_kb = memory_kb(pid)
@@ -261,12 +265,13 @@ def test_a_subscriber_that_never_reads_costs_the_others_nothing(daemon: Daemon, 
     while told[-1] < told[0] + 2000:
         told.append(heard(reader))
     assert len(told) > 1600, "a busy computer may cost some, a subscriber that stands still none"
+    grew_kb = memory_kb(pid) - before_kb
     got = [heard(stalled)]
     while stalled.poll(100) and got[-1] <= told[-1]:
         got.append(heard(stalled))
     context.destroy(0)
     assert len([seq for seq in got if told[0] <= seq <= told[-1]]) < len(told), "it was never too slow"
-    assert memory_kb(pid) < before_kb + 4000
+    assert grew_kb < 550
 
 
 def heard(subscriber: zmq.Socket[bytes]) -> int:
@@ -277,7 +282,8 @@ def heard(subscriber: zmq.Socket[bytes]) -> int:
 
 
 def memory_kb(pid: int) -> int:
-    return int(re.findall(r"^VmRSS:\s+(\d+)", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)[0])
+    """What it has of its own; the pages of the loop's memory, of which it reads others in each tick, do not count."""
+    return int(re.findall(r"^RssAnon:\s+(\d+)", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)[0])
 
 
 def hold_at_last(tool: RemotePort, position_m: float) -> None:

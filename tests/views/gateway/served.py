@@ -59,9 +59,9 @@ class Served:
         return Deaf(self.port)
 
     def memory_kb(self) -> int:
-        """Memory that it has resident."""
+        """Memory of its own; a client that is not read to the end costs 0.2 to 0.7 MB of it."""
         status = Path(f"/proc/{self.process.pid}/status").read_text()
-        return int(re.findall(r"VmRSS:\s+(\d+)", status)[0])
+        return int(re.findall(r"RssAnon:\s+(\d+)", status)[0])
 
 
 class Deaf:

@@ -175,7 +175,7 @@ def test_a_client_that_never_reads_costs_the_others_nothing(served: Served) -> N
         for _ in range(20):
             deaf.say(PROBE)
             assert position_m(answer(other)) == pytest.approx(HERE_M, abs=1e-4)
-    assert served.memory_kb() < before_kb + 8_000
+    assert served.memory_kb() < before_kb + 2_000
 
 
 def test_while_the_daemon_is_away_there_is_no_device_and_then_there_is_again() -> None:
