@@ -62,7 +62,7 @@ def press(law: str, keys: str) -> Journal:
 
 
 def modes(law: str) -> list[str]:
-    """The defaults, each choice that they are not, and each number halved, or two more of a count."""
+    """The defaults, each choice that they are not, and each number halved, or three more of a count."""
     found = [""]
     for name, field in plugins.law(law).Params.model_fields.items():
         if get_origin(field.annotation) is Literal:
@@ -70,7 +70,7 @@ def modes(law: str) -> list[str]:
         elif field.annotation is bool:
             found.append(f"{name} = {str(not field.default).lower()}\n")
         else:
-            other = field.default + 2 if isinstance(field.default, int) else 0.5 * field.default
+            other = field.default + 3 if isinstance(field.default, int) else 0.5 * field.default
             with contextlib.suppress(ValidationError):
                 plugins.law(law).Params.model_validate({name: other})
                 found.append(f"{name} = {other!r}\n")

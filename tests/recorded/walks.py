@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 
 from hapticd.shapes.pose import Pose
@@ -55,6 +56,21 @@ def walk(name: str) -> Journal:
     return journal
 
 
+def jumps(name: str) -> Journal:
+    """A device that is put down anywhere, inside as well, and one that jumps a long way each tick."""
+    journal = Journal()
+    rng = random.Random(9)
+    first = PLACES[name][0].pose
+    for jumping in (False, True):
+        proxy = Proxy(PLACES[name], 0.5 * jumping, 0.4 * jumping)
+        for journal.tick in range(300):
+            x, y, z = (0.025 * (2.0 * rng.random() - 1.0) for _ in range(3))
+            (go if jumping and journal.tick else stand)(proxy, first.point((x, y, z)))
+            for field in (*READ, *RUBBED):
+                journal.note(f"{jumping} {field}", getattr(proxy, field))
+    return journal
+
+
 def _point(hand: Hand) -> tuple[float, float, float]:
     x, y, z = hand.go()
     return x, y, z
@@ -62,5 +78,8 @@ def _point(hand: Hand) -> tuple[float, float, float]:
 
 WALKS: dict[str, Callable[[], Journal]] = {
     f"walk {name}": lambda name=name: walk(name)  # type: ignore[misc]  # a name of each one's own
+    for name in PLACES
+} | {
+    f"jumps {name}": lambda name=name: jumps(name)  # type: ignore[misc]  # a name of each one's own
     for name in PLACES
 }
