@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from struct import pack
 
 import pytest
 from cobs import cobs
@@ -152,3 +153,13 @@ def test_newer_means_up_to_half_a_turn_ahead(than: int, step: int) -> None:
     assert messages.is_newer(ahead, than)
     assert not messages.is_newer(than, ahead)
     assert not messages.is_newer(than, than)
+
+
+def test_what_a_rig_calls_itself_can_be_shown_and_moves_no_cursor() -> None:
+    """It ends in logs and terminals: line ends, escapes and what is no ASCII become question marks."""
+    named = (b"a\nb\x1b[31m \xff~\0gone", b"7\r\0\n")
+    numbers = (messages.VERSION, messages.IDENTITY, 1, 0, 0, 1, 0, 0, 0, 20, 4, 1, 2, 3)
+    body = pack("<BBHHIBBBBHH3B16s12s", *numbers, *named)
+    said = messages.decode(body + messages.checksum(body).to_bytes(2, "little"))
+    assert isinstance(said, messages.Identity)
+    assert (said.model, said.serial) == ("a?b?[31m ?~", "7?")
