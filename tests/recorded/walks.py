@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from functools import partial
 
 from hapticd.shapes.pose import Pose
 from hapticd.shapes.reach import slack_m
@@ -81,9 +82,5 @@ def _point(hand: Hand) -> tuple[float, float, float]:
 
 
 WALKS: dict[str, Callable[[], Journal]] = {
-    f"walk {name}": lambda name=name: walk(name)  # type: ignore[misc]  # a name of each one's own
-    for name in PLACES
-} | {
-    f"jumps {name}": lambda name=name: jumps(name)  # type: ignore[misc]  # a name of each one's own
-    for name in PLACES
+    f"{what} {name}": partial(run, name) for what, run in (("walk", walk), ("jumps", jumps)) for name in PLACES
 }
