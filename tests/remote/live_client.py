@@ -118,6 +118,12 @@ class Session:
         """What became of the press, from what was told."""
         return self.judged([tick.x_m for tick in self.ticks])
 
+    @property
+    def span_m(self) -> float:
+        """How far it moved at the end [m]."""
+        x_m = [tick.x_m for tick in self.ticks[-round(Criterion().window_s / PERIOD_S) :]]
+        return max(x_m) - min(x_m)
+
     def judged(self, x_m: list[float]) -> Outcome:
         """What became of a press whose positions these are, to the end."""
         criterion = Criterion(still_m=STILL_M)

@@ -7,6 +7,8 @@ has failed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from hapticd.offline.outcome import Outcome
@@ -29,7 +31,10 @@ DAILY = {("tool", 1), ("force", 11)}
         for kind in ("tool", "force")
     ],
 )
-def test_a_random_client_is_held_within_limits_without_a_step_and_comes_to_rest(kind: str, index: int) -> None:
+def test_a_random_client_is_held_within_limits_without_a_step_and_comes_to_rest(
+    kind: str, index: int, record_property: Callable[[str, object], None]
+) -> None:
+    """`--junit-xml` has of each client what the law made of it, and what two dampers would have made of the same."""
     case, config = pressed(SEED, index, kind, at_s=1.0)
     with Daemon(config.text).wait_ready() as daemon:
         session = drive(daemon, case, config, ticks=4000 if (kind, index) in DAILY else 5500)
@@ -38,6 +43,10 @@ def test_a_random_client_is_held_within_limits_without_a_step_and_comes_to_rest(
     assert session.unramped() == []
     positions_m = again(session)
     assert all(tick.x_m == positions_m[tick.seq] for tick in session.ticks), "to the last bit"
-    if session.outcome is not Outcome.SETTLED and Outcome.SETTLED in under(session, DAMPERS):
+    dampers = under(session, DAMPERS)
+    record_property("client", f"{kind}:{SEED}:{index}")
+    record_property("law", f"{session.outcome}, moves by {1e3 * session.span_m:.3f} mm")
+    record_property("dampers", ", ".join(map(str, dampers)))
+    if session.outcome is not Outcome.SETTLED and Outcome.SETTLED in dampers:
         studied = run(draw(SEED, index, kind), parse_laws(config.config.remote.law, {})[0])
         assert studied[0] != Outcome.SETTLED
