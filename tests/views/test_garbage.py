@@ -16,8 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.client.commands import command
+from hapticd_views.knocking import MOST_WAITING
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
-from tests.daemon.test_flood import descriptors, free_port, resident_mb
+from tests.daemon.test_flood import descriptors, flood, free_port, resident_mb
 from tests.examples import examples
 from tests.remote.stage import remote_pid
 from tests.views.dashboard.served import Served as Dashboard
@@ -163,3 +164,18 @@ def test_no_bytes_at_any_door_end_what_listens_or_cost_a_subscriber_a_tick(
     assert daemon.process.poll() is None
     assert remote_pid(daemon) == doors["scene"].pid
     assert all(Path(f"/proc/{other.pid}").exists() for other in doors.values())
+
+
+@pytest.mark.parametrize("name", ["dashboard", "gateway"])
+def test_of_connections_that_say_nothing_the_oldest_are_ended(house: tuple[Daemon, dict[str, Door]], name: str) -> None:
+    """With a shell's 1024 descriptors used up, a page that was there already got no answer any more."""
+    where = house[1][name].where
+    with flood(where, 3 * MOST_WAITING) as opened:
+        for one in opened[: 2 * MOST_WAITING]:
+            one.settimeout(PATIENCE_S)
+            with contextlib.suppress(ConnectionError):
+                assert one.recv(1) == b""
+        for one in opened[2 * MOST_WAITING + 1 :]:
+            one.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                one.recv(1)

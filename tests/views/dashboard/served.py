@@ -6,6 +6,7 @@ import os
 import re
 import socket
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 from tests.daemon.running import HAPTICD
@@ -17,13 +18,14 @@ class Served:
     Args:
         runtime: $HAPTICD_RUNTIME_DIR of the daemon.
         arguments: of the command besides the port.
+        prefix: what comes before the command.
     """
 
-    def __init__(self, runtime: Path, *arguments: str) -> None:
+    def __init__(self, runtime: Path, *arguments: str, prefix: Sequence[str] = ()) -> None:
         with socket.create_server(("127.0.0.1", 0)) as taken:
             self.port = taken.getsockname()[1]
         self.process = subprocess.Popen(
-            [HAPTICD, "dashboard", "--port", str(self.port), *arguments],
+            [*prefix, HAPTICD, "dashboard", "--port", str(self.port), *arguments],
             env={**os.environ, "HAPTICD_RUNTIME_DIR": str(runtime)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

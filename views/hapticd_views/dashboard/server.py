@@ -25,6 +25,7 @@ from hapticd_views.dashboard.page import Page
 from hapticd_views.dashboard.requests import LARGEST_REQUEST, Command, Edit, FormRequest, Hello, request
 from hapticd_views.dashboard.target import Target
 from hapticd_views.dashboard.viewers import MOST_VIEWERS, Audience, Viewer
+from hapticd_views.knocking import Knocking
 
 LIVE = "/live"
 """Path of the WebSocket."""
@@ -53,6 +54,7 @@ class Dashboard:
         self._address = address
         self._token = token
         self._page = Page(address)
+        self._knocking = Knocking()
         self._audience = Audience()
         self._feed = Feed(target, self._audience.send)
         self._editor = Editor(target)
@@ -73,6 +75,7 @@ class Dashboard:
             self._address.host,
             self._address.port,
             process_request=self._admit,
+            create_connection=self._knocking.connection(),
             compression=None,
             max_size=LARGEST_REQUEST,
             max_queue=4,
@@ -120,6 +123,7 @@ class Dashboard:
         except (TimeoutError, ConnectionClosed):
             return
         viewer.answer({"hello": {"version": __version__, "keep_s": KEEP_S, "may_command": viewer.may_command}})
+        self._knocking.welcome(connection)
         self._audience.join(viewer, self._feed.history.messages())
         sending = asyncio.create_task(viewer.run())
         try:

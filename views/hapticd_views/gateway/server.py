@@ -19,6 +19,7 @@ from hapticd.errors import ClientError
 from hapticd_views.address import Address
 from hapticd_views.gateway import haply
 from hapticd_views.gateway.follower import Device, Follower
+from hapticd_views.knocking import Knocking
 
 LARGEST_MESSAGE = 16 * 1024
 """Bytes; a client that sends more is disconnected."""
@@ -65,6 +66,7 @@ class Gateway:
         self._may_push = may_push
         self._origins = origins
         self._tell = tell
+        self._knocking = Knocking()
         self._clients: set[ServerConnection] = set()
         self._turns = Turns()
 
@@ -83,6 +85,7 @@ class Gateway:
             self._address.host,
             self._address.port,
             process_request=self._admit,
+            create_connection=self._knocking.connection(),
             compression=None,
             max_size=LARGEST_MESSAGE,
             max_queue=4,
@@ -115,6 +118,7 @@ class Gateway:
     async def _talk(self, connection: ServerConnection) -> None:
         """One client, until it has gone."""
         connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KERNEL_BYTES)
+        self._knocking.welcome(connection)
         self._clients.add(connection)
         told: set[str] = set()
         try:
