@@ -160,7 +160,7 @@ class ConnectionBound:
                 if self._endpoints.get(endpoint, {}).pop(descriptor, None) is not None:
                     _shut(descriptor, endpoint)
         for endpoint in {endpoint for _, endpoint in ended}:
-            self._say(endpoint, "what clients have sent fills the memory; those that send were disconnected")
+            self._tell(endpoint, "what clients have sent fills the memory; those that send were disconnected")
 
     def _learn(self, event: int, descriptor: int, endpoint: str) -> None:
         if event == zmq.EVENT_CLOSED:  # the endpoint itself, and with it all that were connected there
@@ -176,7 +176,7 @@ class ConnectionBound:
             victim = self._victim(clients)
             del clients[victim]
             _shut(victim, endpoint)
-            self._tell(endpoint)
+            self._tell(endpoint, f"more than {self._most} connections; the oldest that say nothing are dropped")
 
     def _victim(self, clients: dict[int, _Client]) -> int:
         *before, _newest = clients
@@ -184,10 +184,7 @@ class ConnectionBound:
             return next(one for one, client in clients.items() if not client.heard_s)
         return min(before, key=lambda one: clients[one].heard_s)
 
-    def _tell(self, endpoint: str) -> None:
-        self._say(endpoint, f"more than {self._most} connections; the oldest that say nothing are dropped")
-
-    def _say(self, endpoint: str, what: str) -> None:
+    def _tell(self, endpoint: str, what: str) -> None:
         now_s = time.monotonic()
         if now_s - self._told_s.get(endpoint + what, -_QUIET_S) >= _QUIET_S:
             self._told_s[endpoint + what] = now_s
