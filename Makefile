@@ -29,7 +29,7 @@ SERVICE_EXTRAS := metrics,dashboard
 PLACE = $(DESTDIR)$(PREFIX)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint web clients nightly bench packages clean install uninstall own-place deb
+.PHONY: help run test lint web clients nightly repeat bench packages clean install uninstall own-place deb
 
 help:
 	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
@@ -37,6 +37,7 @@ help:
 	@echo "make lint     formatting, style, types and import rules only"
 	@echo "make web      uPlot for hapticd dashboard, by npm, in the version and with the hash that views/ names"
 	@echo "make nightly  the long runs: every shipped configuration, every property on many examples"
+	@echo "make repeat   tests that start a daemon, again and again: REPEAT=50, REPEAT_TESTS=files"
 	@echo "make bench    how long a tick takes on this machine"
 	@echo "make install  the daemon as a system service (as root); PREFIX=$(PREFIX), DESTDIR for packages"
 	@echo "make uninstall  all of that away again, except configurations and fault records"
@@ -83,9 +84,15 @@ $(CLIENTS)/.ready: tests/views/gateway/isaaclab.txt | $(BIN)/python
 nightly: packages web clients $(READY)
 	SEED=$$(date +%Y%m%d) $(BIN)/pytest -m nightly --timeout 3600 --override-ini faulthandler_timeout=3660
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
-	REPEAT=50 $(BIN)/pytest tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views \
-		tests/remote tests/doctor tests/driven tests/your_simulator tests/test_readme.py tests/test_bridges_page.py \
-		tests/test_python_page.py \
+	$(MAKE) repeat
+
+# Every test that starts a daemon, again and again beside a busy processor, three side by side. The whole takes a night:
+# make repeat REPEAT=10 REPEAT_TESTS=tests/daemon/test_deaths.py
+REPEAT ?= 50
+REPEAT_TESTS ?= tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views tests/remote \
+    tests/doctor tests/driven tests/your_simulator tests/test_readme.py tests/test_bridges_page.py tests/test_python_page.py
+repeat: web clients $(READY)
+	REPEAT=$(REPEAT) $(BIN)/pytest $(REPEAT_TESTS) --numprocesses 3 --dist load --maxschedchunk 1 --max-worker-restart 0 \
 		--timeout 7200 --override-ini faulthandler_timeout=7260
 
 bench: $(READY)
