@@ -123,7 +123,9 @@ def test_another_hand_is_another_base() -> None:
     assert np.isinf(taking_over([3.0], law("energy-cycle"), 1)).all()
 
 
-@pytest.mark.parametrize("wrong", [("--share", "0"), ("--seed", "-1"), ("--laws", "no-such-law")])
+@pytest.mark.parametrize(
+    "wrong", [("--share", "0"), ("--seed", "-1"), ("--laws", "no-such-law"), ("--front", "--missed")]
+)
 def test_what_cannot_be_run_is_one_line_and_exit_2(
     wrong: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
