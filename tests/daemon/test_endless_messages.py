@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import struct
 import sys
@@ -19,6 +20,7 @@ from hapticd.client.commands import command
 from hapticd.keys.connections import MOST_CONNECTIONS
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.remote.stage import CONFIG, remote_pid
+from tests.remote.test_life import classes
 
 LARGEST_MB = 450.0
 """Of the 512 MB that the unit allows; connections are ended at 160, and a busy computer ends them later."""
@@ -123,3 +125,37 @@ def test_programs_that_leave_their_connections_open_do_not_keep_disarm_away(daem
             client.send(msgpack.packb({"do": "status"}))
             assert client.poll(int(PATIENCE_S * 1e3))
         command("disarm", timeout_s=PATIENCE_S)
+
+
+def test_a_flood_that_never_becomes_a_message_does_not_keep_a_processor_at_real_time(daemon: Daemon) -> None:
+    """Signs of life, which ZeroMQ answers by itself: the process that hears clients would see nothing of them."""
+    pid = remote_pid(daemon)
+    before = classes(pid)
+    over = threading.Event()
+
+    def ping(raw: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while not over.is_set():
+                raw.sendall(b"\x04\x07\x04PING\0\0" * 6000)
+
+    def pong(raw: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while not over.is_set() and raw.recv(1 << 20):
+                pass
+
+    with contextlib.ExitStack() as held:
+        threads = []
+        for _ in range(SENDERS):
+            raw = held.enter_context(connected(daemon, "scene", b"DEALER"))
+            raw.settimeout(1.0)
+            threads += [threading.Thread(target=say, args=(raw,)) for say in (ping, pong)]
+        for thread in threads:
+            thread.start()
+        try:
+            wait_until(lambda: classes(pid) == {os.SCHED_OTHER}, "an ordinary process")
+        finally:
+            over.set()
+            for thread in threads:
+                thread.join()
+    wait_until(lambda: classes(pid) == before, "the flood to be over")
+    assert remote_pid(daemon) == pid
