@@ -96,7 +96,10 @@ GIVEN = 8.0 + 0.5 * 3000.0 * DT_S
 def test_what_a_force_has_given_in_a_half_swing_is_added_to_the_damping_and_twice_from_the_second_on() -> None:
     port = Port()
     port.swing(8.0)
-    port.state.again = 1.0  # as after a half swing that gave nothing
+    port.swing(-12.0, times=2)
+    assert port.state.again == 1.0, "the row has ended"
+    port.swing(8.0)
+    port.state.again = 1.0
     dampings = [port.damping, *port.swing(8.0, times=4)]
     added = [b - a for a, b in pairwise(dampings)]
     assert len(added) >= 5
@@ -104,11 +107,14 @@ def test_what_a_force_has_given_in_a_half_swing_is_added_to_the_damping_and_twic
     assert added[1:] == [pytest.approx(2.0 * GIVEN, rel=0.25)] * (len(added) - 1)
 
 
-def test_a_spring_lets_two_half_swings_pass_after_each_that_adds() -> None:
-    dampings = Port().swing(8.0, times=7, stiffness_n_per_m=300.0)
+def test_a_spring_lets_two_half_swings_pass_at_its_beginning_and_after_each_that_adds() -> None:
+    port = Port()
+    base = 0.015 * 300.0
+    assert port.swing(8.0, stiffness_n_per_m=300.0) == [pytest.approx(base)] * 2
+    dampings = [base, *port.swing(8.0, times=8, stiffness_n_per_m=300.0)]
     added = [b - a for a, b in pairwise(dampings)]
-    assert 3 <= len(added) <= 5  # of fourteen half swings
-    assert added[1:] == [pytest.approx(GIVEN, rel=0.25)] * (len(added) - 1)
+    assert len(added) == 6  # of eighteen half swings
+    assert added == [pytest.approx(GIVEN, rel=0.25)] * 6
 
 
 def test_each_half_swing_that_gives_nothing_takes_off_a_twentieth_down_to_what_was_too_little() -> None:
@@ -169,8 +175,28 @@ def test_there_is_an_end_to_damping_whatever_mass_is_felt() -> None:
     port = Port()
     port.go(0.0, 0.0)
     port.state.felt_mass_kg = 50.0
-    port.swing(60.0, times=5)
-    assert port.damping <= 300.0
+    port.state.damping_n_s_per_m = 1e6
+    port.go(0.0, 0.0)
+    assert port.damping == 300.0
+
+
+def test_a_damping_is_at_most_the_felt_mass_over_a_period_and_less_where_forces_come_late() -> None:
+    """A sampled damper shakes by itself from twice that on, and from 0.83 times where forces come a sample late."""
+    for late, most in ((0, 200.0), (1, 70.0)):
+        port = Port()
+        port.go(0.0, 0.0)
+        port.state.felt_mass_kg, port.state.forces_late = 0.2, bool(late)
+        port.state.damping_n_s_per_m = 1e6
+        port.go(0.0, 0.0)
+        assert port.damping == pytest.approx(most)
+
+
+def test_damping_that_is_taken_over_is_in_force_at_once_and_after_silence_comes_anew() -> None:
+    taken = Port()
+    late_cycle.start(taken.state, taken.params, LawSnapshot(damping_n_s_per_m=80.0))
+    assert taken.go(1e-4, 3.0) == pytest.approx(3.0 - 80.0 * 0.5 * 0.1)
+    taken.leave()
+    assert taken.go(1e-4, 3.0) == pytest.approx(3.0 - 80.0 / 11.0 * 0.5 * 0.1)
 
 
 @pytest.mark.parametrize("late", [10, 40, 80])
