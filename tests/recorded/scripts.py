@@ -42,6 +42,7 @@ CHANGING = (
     "{at_s = 0.2, stiffness_n_per_m = 1200.0, damping_n_s_per_m = 0.5}]\n"
 )
 CEILING = '[[scene.walls]]\nstiffness_n_per_m = 700.0\nposition_m = 0.004\nfree_side = "negative"\n'
+LATE = '[velocity]\nestimator = "foaw"\nsamples = 16\nnoise_m = 1e-6\n'
 SIDE = '[[scene.walls]]\naxis = "x"\nstiffness_n_per_m = 2500.0\nposition_m = -0.001\ndamping_n_s_per_m = 3.0\n'
 
 
@@ -113,7 +114,7 @@ def walls() -> dict[str, Script]:
             seed=12,
         ),
         "late": Script(
-            WALL + by_law("energy-cycle") + '[velocity]\nestimator = "foaw"\nsamples = 16\nnoise_m = 1e-6\n',
+            WALL + by_law("energy-cycle") + LATE,
             declared={"has_clock": True, "host_silence_ms": 20.0},
             acts={
                 100: reads_take(0.6e-3),
@@ -131,6 +132,7 @@ def walls() -> dict[str, Script]:
                 470: reads_take(0.1e-3),
                 500: asks("clear"),
                 505: asks("arm"),
+                598: switches(WALL + CEILING + by_law("energy-cycle") + LATE),
                 600: computes(0.96e-3),
                 601: reads_take(0.97e-3),
                 640: computes(20e-6),
