@@ -42,6 +42,23 @@ def test_it_does_one_thing_after_the_other_and_ends() -> None:
     assert not thread.is_alive()
 
 
+def test_what_was_done_is_let_go_of_before_there_is_something_else_to_do() -> None:
+    """It may have a mesh in it, or an error with all its frames, and in the loop's process nothing else frees it."""
+    gone = threading.Event()
+
+    class Work:
+        def __call__(self) -> None: ...
+
+        def __del__(self) -> None:
+            gone.set()
+
+    beside = Worker()
+    beside.start()
+    beside.do(Work())
+    assert gone.wait(PATIENCE_S)
+    beside.end()
+
+
 def test_it_ends_after_what_it_is_doing() -> None:
     before = threads()
     beside = Worker()
