@@ -28,6 +28,18 @@ STILL_CHANGING = ("ring-damping", "late-cycle")
 """Laws that are worked on; they are held by tests of their own alone."""
 
 
+TOGETHER = {
+    "energy-cycle": [
+        'work = "total"\npairing = "new-force"\n',
+        'work = "total"\npairing = "power"\n',
+        'rule = "signed"\ncap = "fixed"\ncap_damping_n_s_per_m = 0.5\n',
+        "small_travel_counts = 9000.0\nsmall_leaks = 0.5\n",
+        "min_travel_counts = 2000.0\n",
+    ],
+}
+"""Modes that show only beside others."""
+
+
 def press(law: str, keys: str) -> Journal:
     """A hand that goes to and fro across the wall, by a spring: what the device feels, and what is booked."""
     journal = Journal()
@@ -63,7 +75,7 @@ def press(law: str, keys: str) -> Journal:
 
 def modes(law: str) -> list[str]:
     """The defaults, each choice that they are not, and each number halved, or three more of a count."""
-    found = [""]
+    found = ["", *TOGETHER.get(law, [])]
     for name, field in plugins.law(law).Params.model_fields.items():
         if get_origin(field.annotation) is Literal:
             found += [f'{name} = "{each}"\n' for each in get_args(field.annotation) if each != field.default]
