@@ -30,7 +30,7 @@ STILL_CHANGING = ("ring-damping", "late-cycle")
 
 TOGETHER = {
     "energy-cycle": [
-        'work = "total"\npairing = "new-force"\nrule = "signed"\ncap = "fixed"\ncap_damping_n_s_per_m = 5.0\n',
+        'work = "total"\npairing = "new-force"\nrule = "signed"\ncap = "fixed"\ncap_damping_n_s_per_m = 1.0\n',
         'work = "total"\npairing = "power"\nrule = "signed"\ncap = "fixed"\n',
         "small_travel_counts = 9000.0\nsmall_leaks = 0.5\n",
         "min_travel_counts = 2000.0\n",
