@@ -82,6 +82,14 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site-packages"
 
 
+@pytest.fixture(autouse=True)
+def own_packages() -> Generator[None, None, None]:
+    """Forget the packages of a laboratory's own that a test has made, so that the next test finds none of that name."""
+    yield
+    for name in [name for name in sys.modules if name.partition(".")[0] in OWN_PACKAGES]:
+        del sys.modules[name]
+
+
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
     """Repeat a test that starts a daemon, where that is asked for."""
     return repeating.repeated(item, nextitem) if repeating.REPEAT > 1 else None
