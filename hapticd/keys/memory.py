@@ -11,8 +11,8 @@ import enum
 import os
 from pathlib import Path
 
-MOST_BYTES = 160 << 20
-"""What the process may have resident; without clients that fill it, it needs a third of that [bytes]."""
+MOST_MORE_BYTES = 112 << 20
+"""What the process may have resident beyond what it had before its first client, some 48 MB in a daemon [bytes]."""
 
 _FREED_S = 1.0  # what ended connections held is free again after that
 _FURTHER_BYTES = 64 << 20
@@ -34,11 +34,11 @@ class MemoryBound:
     is not clients who have the memory, and the bound is further up.
 
     Args:
-        most_bytes: what may be resident.
+        most_more_bytes: what may be resident beyond what is now.
     """
 
-    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
-        self._most_bytes = most_bytes
+    def __init__(self, most_more_bytes: int = MOST_MORE_BYTES) -> None:
+        self._most_bytes = resident_bytes() + most_more_bytes
         self._full_s: float | None = None
         self._ended_all = False
 

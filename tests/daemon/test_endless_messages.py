@@ -23,7 +23,7 @@ from tests.remote.stage import CONFIG, remote_pid
 from tests.remote.test_life import classes
 
 LARGEST_MB = 450.0
-"""Of the 512 MB that the unit allows; connections are ended at 160, and a busy computer ends them later."""
+"""Of the 512 MB that the unit allows; connections are ended at some 160, and a busy computer ends them later."""
 
 MOST_HELD = 200 << 20
 """What each client would fill, were it not stopped: three of them more than the unit allows [bytes]."""

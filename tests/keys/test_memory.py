@@ -28,6 +28,16 @@ def test_within_the_bound_no_connection_is_ended(held: list[int]) -> None:
     assert {bound.turn(0.1 * look) for look in range(50)} == {Culprits.NO_ONE}
 
 
+def test_what_the_process_had_before_counts_for_no_client(held: list[int]) -> None:
+    """A program that makes a publisher of its own may be large already."""
+    held.append(10 * BOUND)
+    bound = MemoryBound(BOUND)
+    held.append(11 * BOUND)
+    assert bound.turn(0.0) is Culprits.NO_ONE
+    held.append(11 * BOUND + 1)
+    assert bound.turn(1.0) is Culprits.SENDERS
+
+
 def test_for_a_second_those_that_send_are_ended_then_all_and_then_the_bound_is_further_up(held: list[int]) -> None:
     bound = MemoryBound(BOUND)
     held.append(BOUND + 1)
