@@ -19,7 +19,7 @@ KEPT_TICKS = 10_000
 """More than is kept for a stalled subscriber: 300 messages of 20 ticks, and what the kernel's buffers hold."""
 
 
-@pytest.mark.parametrize("ticks", [20_000, pytest.param(60_000, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("ticks", [14_000, pytest.param(60_000, marks=pytest.mark.nightly)])
 def test_sixteen_subscribers_get_every_tick_while_another_is_stalled(ticks: int) -> None:
     # A low mark, so that the stalled subscriber has long been cut off at the end.
     config = PRESSED + "[telemetry]\nsend_high_water = 300\n"

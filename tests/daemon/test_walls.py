@@ -106,12 +106,13 @@ def share(verdicts: Sequence[bool]) -> float:
     return sum(verdicts) / len(verdicts)
 
 
+NIGHTLY = pytest.mark.nightly  # each stiffness takes 13 s of six real-time loops at once; every day the hardest of them
+
+
+@NIGHTLY
 def test_without_a_law_8_kn_per_m_is_the_last_steady_wall() -> None:
     rests = run(everywhere("none", 8000.0))
     assert all(rest.peak_to_peak_m < 0.2e-3 for rest in rests), rests
-
-
-NIGHTLY = pytest.mark.nightly  # each stiffness takes 13 s of six real-time loops at once; every day the hardest of them
 
 
 @pytest.mark.parametrize("stiffness", [pytest.param(9000.0, marks=NIGHTLY), 12000.0])

@@ -75,6 +75,7 @@ def test_a_mesh_runs_interpreted() -> None:
     assert len(ran.trace) == 20
 
 
+@pytest.mark.nightly
 def test_a_run_that_leaves_all_bounds_ends_as_it_does_interpreted() -> None:
     """A device that its own friction drives flies off; the daemon says so, and so does a run begun compiled."""
     text = (

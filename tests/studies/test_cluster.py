@@ -86,6 +86,7 @@ def finished(journal: Path) -> int:
     return max(0, journal.read_bytes().count(b"\n") - 1) if journal.exists() else 0
 
 
+@pytest.mark.nightly
 def test_a_worker_that_is_killed_in_the_middle_costs_no_result(cluster: Cluster, tmp_path: Path) -> None:
     command = [HAPTICD, *MAP, "--output", str(tmp_path / "far"), "--cluster", cluster.url]
     study = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)

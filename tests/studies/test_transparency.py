@@ -217,6 +217,7 @@ def test_a_wall_that_pulls_the_leaving_hand_back_is_caught() -> None:
     assert scores.pull_share(x_m, force) == pytest.approx(2.0 / 6.0)
 
 
+@pytest.mark.nightly
 def test_a_hand_that_lets_go_leaves_a_damped_wall_late_and_slowly() -> None:
     held = device("let-go", 4000.0)
     free, glued = figures(held, "none"), figures(held, "damper:damping_n_s_per_m=100")
