@@ -150,7 +150,7 @@ REACHING = ("hapticd/tick", "hapticd/shapes", "hapticd/loop", "hapticd/keys", "h
 """Where a fault reaches a hand or lets someone in."""
 
 LEFT = {
-    "what is told of a tick and not what is done in it": (
+    "what is published of a tick and not what is done in it": (
         *(f"hapticd/tick/{name}.py" for name in ("contact_record", "event", "flags", "record")),
         "hapticd/tick/remote/port_record.py",
     ),

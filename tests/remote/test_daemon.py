@@ -246,7 +246,7 @@ class Flood:
 
 
 def test_a_subscriber_that_never_reads_costs_the_others_nothing(daemon: Daemon, tool: RemotePort) -> None:
-    """Behind what waits for it, it loses ticks; one that reads is told what it was told without.
+    """Behind what waits for it, it loses ticks; one that reads gets what it got without.
 
     The fixture's client does not read either. A thousand ticks that wait for both take 0.4 MB; the two thousand of this
     test take 0.77 MB if all wait.

@@ -1,4 +1,4 @@
-"""A simulated device is told where the wall is that its hand goes to."""
+"""A simulated device gets to know the wall that its hand goes to."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ WALL = '[[scene.walls]]\nstiffness_n_per_m = 1000.0\nposition_m = {}\nfree_side 
 
 
 class Placed:
-    """A driver that keeps what it is told."""
+    """A driver that keeps what it is given."""
 
     def __init__(self) -> None:
         self.told: list[tuple[float, int]] = []

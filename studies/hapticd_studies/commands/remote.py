@@ -34,8 +34,8 @@ def command(
 
     Two kinds of client on the simulated omega7, in the daemon's own tick: a tool behind a coupling that is pressed on a
     table, and a wall that is sent as a raw force. First a ladder of stiffness at four rates, with and without a delay;
-    then random clients of 30 to 1000 Hz with delay, jitter, loss and pauses, held against constant dampers; what the
-    last law does not hold is told with the window of dampers that do. Writes a picture, CSV and JSON. Interrupted, the
+    then random clients of 30 to 1000 Hz with delay, jitter, loss and pauses, held against constant dampers; of what
+    the last law does not hold it says which dampers do. Writes a picture, CSV and JSON. Interrupted, the
     same command goes on where it was.
 
     Example: hapticd study remote --output remote    hapticd study remote --replay force:1:17
