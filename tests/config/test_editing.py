@@ -89,7 +89,7 @@ def test_what_the_law_before_was_set_to_stays_behind_as_one_comment_a_law() -> N
 
 
 def test_there_and_back_again_is_the_same_file() -> None:
-    bare = REFERENCE.replace("brake_ratio = 0.6 ", "# brake_ratio = 0.6 ")
+    bare = REFERENCE.replace("brake_ratio = 0.7 ", "# brake_ratio = 0.7 ")
     there = with_law(bare, "lab.toml", "none", {})
     assert with_law(there, "lab.toml", "ring-damping", {}) == bare
 

@@ -82,6 +82,11 @@ def test_the_reference_names_every_key_of_the_daemon() -> None:
     assert not missing
 
 
+def test_the_reference_sets_its_law_to_what_it_is_without_being_set() -> None:
+    loaded = load(directory("config") / "hapticd.toml")
+    assert loaded.params == loaded.law.Params()
+
+
 def test_what_the_reference_comments_out_is_valid_too() -> None:
     """Every `# key = value` line can be uncommented."""
     text = (directory("config") / "hapticd.toml").read_text()
