@@ -117,7 +117,7 @@ class DaemonClient(Client):
         calibrate(self._instance, self._endpoint(), self._keys)
 
     def tare(self) -> None:
-        """Take the present position as the scene's origin; the daemon must be disarmed."""
+        """Take the present position as the scene's origin; the daemon must be disarmed, or be ramping the force out."""
         self._ask("tare")
 
     def clear(self) -> None:

@@ -89,6 +89,7 @@ class RequestHandler:
         To ask for disarming is to call it off.
         """
         session = self._session
+        yield from self._until_released()
         if session.tick.guard.mode is not Mode.DISARMED or session.driver.state is not DriverState.OPEN:
             raise HapticdError("calibration moves the arm by itself: `hapticd disarm` first")
         session.event(EventCode.CALIBRATING, "calibrating: the arm moves by itself")
@@ -116,12 +117,19 @@ class RequestHandler:
 
     def _do_tare(self) -> Generator[None, None, None]:
         tick = self._session.tick
+        yield from self._until_released()
         if not tick.tare():
             raise HapticdError("tare moves the walls: `hapticd disarm` first, and the device must know where it is")
         axes = zip(tick.info.axes, tick.motion.origin_m, strict=True)
         origin_m: dict[str, float | int | str] = {f"origin_{axis}_m": origin for axis, origin in axes}
         self._session.event(EventCode.TARED, "tared: positions count from here", **origin_m)
         yield
+
+    def _until_released(self) -> Generator[None, None, None]:
+        """Wait for the ramp of a disarming that was asked for just before: disarmed is what comes of it."""
+        session = self._session
+        while session.tick.guard.mode is not Mode.ARMED and session.driver.state is DriverState.ENABLED:
+            yield
 
     def _do_switch(
         self,

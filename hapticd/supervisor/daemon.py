@@ -123,6 +123,7 @@ class Daemon:
         self._device_lost: LoopEvent | None = None
         self._problem = ""
         self._stopping = False
+        self._ready = False
         self._stop_by_s = 0.0
 
     def run(self) -> int:
@@ -226,8 +227,6 @@ class Daemon:
         records = state.loop.reader.read()
         state.status.add(records)
         if records:
-            if before is None:
-                state.notifier.send("READY=1")
             state.notifier.feed_watchdog()
             if before is None or _noted(before) != _noted(records[-1]):
                 state.status_due_s = 0.0
@@ -333,4 +332,7 @@ class Daemon:
         )
         state.publisher.status(status.as_map())
         doing = f"no device: {state.recovery.why}" if state.recovery.lost else f"{state.status.rate_hz:.0f} Hz"
-        state.notifier.send(f"STATUS={doing}, law {status.law}")
+        # Ready once the status tells of ticks: who comes after that finds none of before them.
+        ready = () if self._ready or state.status.last is None else ("READY=1",)
+        self._ready = self._ready or bool(ready)
+        state.notifier.send(*ready, f"STATUS={doing}, law {status.law}")

@@ -101,8 +101,12 @@ def test_a_refused_command_says_why() -> None:
         for refused in (daemon.tare, daemon.calibrate):
             with pytest.raises(RefusedError, match="hapticd disarm"):
                 refused()
+
+
+@pytest.mark.usefixtures("daemon")
+def test_a_tare_waits_for_the_ramp_of_a_disarming_just_before() -> None:
+    with connect() as daemon:
         daemon.disarm()
-        daemon.wait_for(Status, lambda one: not one.armed and not one.releasing, timeout_s=PATIENCE_S)
         daemon.tare()
         assert daemon.wait_for(EventCode.TARED, timeout_s=PATIENCE_S).fields
 

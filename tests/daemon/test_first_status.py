@@ -20,6 +20,20 @@ from hapticd.supervisor.status import StatusBuilder
 from hapticd.telemetry.records import Status
 from hapticd.tick.flags import Flag
 from hapticd.tick.record import RecordLayout, TickRecord
+from tests.daemon.running import Daemon, Subscriber
+from tests.daemon.test_deaths import PRESSED
+
+# What `hapticd run` finds on its path: once systemd has been told that it is ready, it gets no processor for a while.
+HELD_UP = """
+import socket, time
+class Slow(socket.socket):
+    def sendto(self, data, *rest):
+        sent = super().sendto(data, *rest)
+        if b"READY=1" in data:
+            time.sleep(0.5)
+        return sent
+socket.socket = Slow
+"""
 
 CONFIG = parse("", "lab.toml")
 INFO = DeviceInfo(
@@ -80,3 +94,13 @@ def test_a_device_that_is_lost_is_not_calibrated_until_the_next_loop_says_so(loo
     status.add([record(Flag(0))])
     found = made(status, loop, recovery)
     assert (found.calibrated, found.latched, found.law_index) == (True, False, 0)
+
+
+def test_who_comes_once_it_is_ready_finds_no_status_of_before_the_first_tick(tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(HELD_UP)
+    with Daemon(PRESSED, pythonpath=tmp_path) as daemon:
+        daemon.wait_ready()
+        with Subscriber(daemon.endpoint, "hapticd/status") as subscriber:
+            _, first = next(subscriber.maps())
+    assert first["armed"]
+    assert first["ticks"] > 0

@@ -6,6 +6,7 @@ from typing import Any
 
 from hapticd import plugins
 from hapticd.config.loading import LoadedConfig
+from hapticd.driver import DriverState
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import ANSWERED, DISARM, DISARMED, REQUESTS, EventReader, SharedMemory
 from hapticd.tick.assemble import make_tick
@@ -41,6 +42,8 @@ class Bench:
             force_n = self.tick.step(self.driver.read(), PERIOD_S)
             if self.tick.guard.mode is not Mode.DISARMED:
                 self.driver.write(force_n)
+            elif self.driver.state is DriverState.ENABLED:
+                self.driver.disable()
         return self.tick
 
     def ask(self, **request: Any) -> str:
