@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from tests import repeating
+from tests import repeating, standstill
 from tests.examples import TIMES, examples
 from tests.longest import LONGEST, ROOT, rank
 
@@ -47,13 +47,21 @@ def pytest_configure(config: pytest.Config) -> None:
     """Give every child the signals that a terminal gives it: a runner in the background has them ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    in_charge = not hasattr(config, "workerinput")
+    if in_charge:  # one witness, and one busy processor, for all workers
+        _keep(config, standstill.witnesses())
     if repeating.REPEAT > 1:
         repeating.watch_for_daemons()
         config.pluginmanager.register(_AmongOthers())
-        if not hasattr(config, "workerinput"):  # one busy processor for all workers
-            busy = contextlib.ExitStack()
-            busy.enter_context(repeating.busy_processor())
-            config.add_cleanup(busy.close)
+        if in_charge:
+            _keep(config, repeating.busy_processor())
+
+
+def _keep(config: pytest.Config, what: contextlib.AbstractContextManager[None]) -> None:
+    """Have it until pytest ends."""
+    kept = contextlib.ExitStack()
+    kept.enter_context(what)
+    config.add_cleanup(kept.close)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -90,9 +98,9 @@ def own_packages() -> Generator[None, None, None]:
         del sys.modules[name]
 
 
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
-    """Repeat a test that starts a daemon, where that is asked for."""
-    return repeating.repeated(item, nextitem) if repeating.REPEAT > 1 else None
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool:
+    """Repeat a test that starts a daemon, where that is asked for; else one during which the computer stood still."""
+    return repeating.repeated(item, nextitem) if repeating.REPEAT > 1 else standstill.run(item, nextitem)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -1,0 +1,89 @@
+"""Whether the computer stood still during a test: then that test's failure says nothing, and it runs once more.
+
+A virtual machine's processor may be taken away for longer than a daemon waits for its loop. A witness sees it: on each
+processor a process of the highest real-time priority that wakes every 10 ms. Where it did not for 50 ms, nothing that
+the test started could have run there. What fails without that is a failure, and so is a second time. Without the right
+to real-time scheduling there is no witness, and every failure is one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+STILL_S = 0.05
+SLOTS = 256
+"""Of each processor; the oldest is overwritten."""
+
+_SLOT = struct.Struct("dd")  # when a standstill ended, on CLOCK_MONOTONIC, and how long it was [s]
+_PLACE = "HAPTICD_TESTS_STANDSTILLS"
+_WITNESS = f"""
+import mmap, os, struct, sys, time
+path, cpu, parent = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+os.sched_setaffinity(0, {{cpu}})
+os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(os.sched_get_priority_max(os.SCHED_FIFO)))
+with open(path, "r+b") as file:
+    memory = mmap.mmap(file.fileno(), 0)
+slot, number, before = struct.Struct("dd"), 0, time.monotonic()
+while os.getppid() == parent:
+    time.sleep(0.01)
+    now = time.monotonic()
+    if now - before > {STILL_S}:
+        slot.pack_into(memory, ({SLOTS} * cpu + number % {SLOTS}) * slot.size, now, now - before)
+        number += 1
+    before = now
+"""
+
+
+@contextlib.contextmanager
+def witnesses() -> Iterator[None]:
+    """A witness on each processor, for this process and those that it starts."""
+    cpus = sorted(os.sched_getaffinity(0))
+    with tempfile.NamedTemporaryFile() as file, contextlib.ExitStack() as stack:
+        file.truncate(SLOTS * (max(cpus) + 1) * _SLOT.size)
+        os.environ[_PLACE] = file.name
+        for cpu in cpus:
+            command = [sys.executable, "-S", "-c", _WITNESS, file.name, str(cpu), str(os.getpid())]
+            witness = stack.enter_context(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+            stack.callback(witness.kill)
+        try:
+            yield
+        finally:
+            del os.environ[_PLACE]
+
+
+def longest_s(since_s: float) -> float:
+    """The longest standstill that ended since then on CLOCK_MONOTONIC; 0 when there was none, or no witness [s]."""
+    place = os.environ.get(_PLACE)
+    if place is None:
+        return 0.0
+    slots = _SLOT.iter_unpack(Path(place).read_bytes())
+    return max((still_s for ended_s, still_s in slots if ended_s >= since_s), default=0.0)
+
+
+def run(item: pytest.Item, next_item: pytest.Item | None) -> bool:
+    """Run a test, and once more if it fails and the computer stood still."""
+    hook = item.ihook
+    hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    began_s = time.monotonic()
+    reports = runtestprotocol(item, nextitem=next_item, log=False)
+    still_s = longest_s(began_s) if any(report.failed for report in reports) else 0.0
+    if still_s:
+        reports = runtestprotocol(item, nextitem=next_item, log=False)
+        said = f"{item.nodeid} ran twice: a processor stood still for {still_s * 1e3:.0f} ms"
+        for report in reports:
+            report.user_properties.append(("prints", said))
+    for report in reports:
+        hook.pytest_runtest_logreport(report=report)
+    hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
