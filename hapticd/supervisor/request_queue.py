@@ -9,7 +9,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import ANSWERED, ANSWERED_AT, DISARM, DISARMED, DISARMED_SINCE, REQUESTS, SharedMemory
+from hapticd.loop.memory import (
+    ANSWERED,
+    ANSWERED_AT,
+    DISARM,
+    DISARMED,
+    DISARMED_SINCE,
+    RECORDS,
+    REQUESTS,
+    SharedMemory,
+)
 
 MOST_WAITING = 100
 
@@ -32,7 +41,8 @@ class RequestQueue:
         self._waiting: deque[_Waiting] = deque()
         self._posted: Answer | None = None
         self._calibrating = False
-        self._disarming: list[Answer] = []
+        self._disarming: deque[tuple[int, Answer]] = deque()  # each by the number of its request
+        self._disarmed: deque[tuple[int, Answer]] = deque()  # each by the record that was the newest then
 
     def submit(self, request: dict[str, Any], answer: Answer, by_ns: int | None = None) -> None:
         """Queue a request; its answer comes from a later `turn`.
@@ -55,7 +65,7 @@ class RequestQueue:
     def disarm(self, answer: Answer) -> None:
         """Have the loop let go at its next tick; a calibration is called off, and what was to arm later does not."""
         self._shared.words[DISARM] += 1
-        self._disarming.append(answer)
+        self._disarming.append((self._shared.words[DISARM], answer))
         waiting, self._waiting = self._waiting, deque()
         for one in waiting:
             if one.request["do"] in ("arm", "calibrate"):
@@ -73,10 +83,10 @@ class RequestQueue:
         """
         words = self._shared.words
         self._drop_expired(time.monotonic_ns())
-        if self._disarming and words[DISARMED] == words[DISARM]:
-            answers, self._disarming = self._disarming, []
-            for answer in answers:
-                answer("")
+        while self._disarmed and fetched > self._disarmed[0][0]:
+            self._disarmed.popleft()[1]("")
+        while self._disarming and self._disarming[0][0] <= words[DISARMED]:
+            self._disarmed.append((words[RECORDS], self._disarming.popleft()[1]))
         if self._posted is not None:
             if words[ANSWERED] != words[REQUESTS] or fetched <= words[ANSWERED_AT]:
                 return
@@ -99,7 +109,8 @@ class RequestQueue:
 
     def abandon(self, why: str) -> None:
         """Answer all that wait: the loop is gone, and so is its force, which is what disarming asks for."""
-        disarming, answers = self._disarming, [one.answer for one in self._waiting]
+        disarming = [answer for _, answer in (*self._disarmed, *self._disarming)]
+        answers = [one.answer for one in self._waiting]
         if self._posted is not None:
             if self._shared.words[ANSWERED] == self._shared.words[REQUESTS]:
                 self._posted(self._shared.verdict())
@@ -107,7 +118,8 @@ class RequestQueue:
                 answers.insert(0, self._posted)
         self._posted = None
         self._calibrating = False
-        self._disarming = []
+        self._disarmed.clear()
+        self._disarming.clear()
         self._waiting.clear()
         for answer in answers:
             answer(why)

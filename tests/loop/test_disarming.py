@@ -64,6 +64,29 @@ class TestInTheQueue:
         turn(requests, shared)
         assert answers == ["disarm: done"]
 
+    def test_it_is_answered_after_the_first_record_that_shows_it(self, shared: SharedMemory) -> None:
+        """Who asks for the status then does not read that the device is armed."""
+        requests, answers = RequestQueue(shared), Answers()
+        requests.disarm(answers.to("disarm"))
+        shared.words[RECORDS] = 8
+        loop_disarms(shared)
+        requests.turn(7)
+        shared.words[RECORDS] = 9
+        requests.turn(8)
+        assert answers == []
+        requests.turn(9)
+        assert answers == ["disarm: done"]
+
+    def test_one_who_asks_again_and_again_keeps_no_answer_away(self, shared: SharedMemory) -> None:
+        """In each turn it has asked once more than the loop has done."""
+        requests, answers = RequestQueue(shared), Answers()
+        requests.disarm(answers.to("first"))
+        for number in range(3):
+            loop_disarms(shared)
+            requests.disarm(answers.to(str(number)))
+            turn(requests, shared)
+        assert answers == ["first: done", "0: done", "1: done"]
+
     def test_what_waits_to_arm_does_not_after_somebody_disarmed(self, shared: SharedMemory) -> None:
         requests, answers = RequestQueue(shared), Answers()
         requests.submit({"do": "switch"}, answers.to("switch"))
