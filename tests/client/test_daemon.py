@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -30,6 +29,7 @@ from hapticd.keys.file import new_pair, write
 from hapticd.keys.store import KeyDirectory
 from tests.daemon.running import PATIENCE_S, Daemon
 from tests.daemon.test_deaths import PRESSED
+from tests.ports import free_port
 
 
 @pytest.fixture
@@ -180,7 +180,7 @@ def test_elsewhere_a_listed_key_watches_and_commands(tmp_path: Path, monkeypatch
     directory.add("wall", replace(wall, watch_only=True))
     for name, pair in (("laptop", laptop), ("wall", wall), ("stranger", new_pair(server))):
         write(tmp_path / name, pair)
-    telemetry, control = (f"tcp://0.0.0.0:{port}" for port in free_ports())
+    telemetry, control = (f"tcp://0.0.0.0:{free_port()}" for _ in range(2))
     tables = f'[telemetry]\ntcp = "{telemetry}"\n[control]\ntcp = "{control}"\n'
     here, there = telemetry.replace("0.0.0.0", "127.0.0.1"), control.replace("0.0.0.0", "127.0.0.1")
     with Daemon(PRESSED + tables).wait_ready():
@@ -201,8 +201,3 @@ def test_elsewhere_a_listed_key_watches_and_commands(tmp_path: Path, monkeypatch
 def test_a_daemon_elsewhere_is_never_mixed_up_with_the_one_here() -> None:
     with pytest.raises(ClientError, match="name the same daemon's telemetry endpoint as well"):
         connect(control="tcp://lab.example:9873")
-
-
-def free_ports() -> tuple[int, int]:
-    with socket.create_server(("0.0.0.0", 0)) as first, socket.create_server(("0.0.0.0", 0)) as second:
-        return first.getsockname()[1], second.getsockname()[1]

@@ -28,6 +28,7 @@ class Terminal:
         self.process = subprocess.Popen(
             ("setsid", "--ctty", *command), stdin=theirs, stdout=theirs, stderr=theirs, env=environment
         )
+        self._place = os.ttyname(theirs)
         os.close(theirs)
         self._descriptor = ours
         self.shown = ""
@@ -46,9 +47,28 @@ class Terminal:
     def type(self, keys: bytes) -> None:
         os.write(self._descriptor, keys)
 
-    def is_silent(self) -> bool:
-        """Whether there is nothing more to be read."""
-        return not select.select([self._descriptor], [], [], 0.0)[0]
+    def stop(self) -> None:
+        """Type Ctrl-S; return when the kernel has taken it, which it does by and by."""
+        self.type(b"\x13")
+        line = os.open(self._place, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+
+        def is_stopped() -> bool:
+            try:
+                os.write(line, b".")
+            except BlockingIOError:
+                return True
+            return False
+
+        try:
+            wait_until(is_stopped, "the terminal to be stopped")
+        finally:
+            os.close(line)
+
+    def has_shown(self, text: str) -> bool:
+        """Whether the terminal shows this, by now."""
+        while select.select([self._descriptor], [], [], 0.0)[0]:
+            self.shown += os.read(self._descriptor, 65536).decode(errors="replace")
+        return text in self.shown
 
     def hang_up(self) -> None:
         """Close the terminal's window."""

@@ -17,6 +17,7 @@ from hapticd.client.commands import command
 from hapticd.keys.connections import MOST_CONNECTIONS
 from hapticd.keys.store import KeyDirectory
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
+from tests.ports import free_port
 
 CONNECTIONS = 1500
 LARGEST_MB = 150.0
@@ -24,11 +25,6 @@ LARGEST_MB = 150.0
 
 FEW_DESCRIPTORS = ("sh", "-c", 'ulimit -S -n 1024; exec "$0" "$@"')
 """A shell as most users have it: 1024 descriptors, and more for who asks."""
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 @contextlib.contextmanager

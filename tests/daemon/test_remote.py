@@ -23,6 +23,7 @@ from hapticd.tick.event import EventCode
 from tests.daemon.computers import Computers, two_computers
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.daemon.test_deaths import PRESSED
+from tests.ports import free_port
 
 
 @pytest.fixture
@@ -54,17 +55,12 @@ def hapticd(*arguments: str, on: Computers | None = None) -> subprocess.Complete
     )
 
 
-def free_ports() -> tuple[int, int]:
-    with socket.create_server(("0.0.0.0", 0)) as first, socket.create_server(("0.0.0.0", 0)) as second:
-        return first.getsockname()[1], second.getsockname()[1]
-
-
 class Remote:
     """A daemon whose two ports every address of its computer has."""
 
     def __init__(self, computers: Computers) -> None:
         self.computers = computers
-        self.ports = free_ports()
+        self.ports = free_port(), free_port()
         ports = "".join(
             f'[{table}]\ntcp = "tcp://0.0.0.0:{port}"\n'
             for table, port in zip(("telemetry", "control"), self.ports, strict=True)

@@ -22,6 +22,7 @@ from hapticd.doctor.finding import Finding, Mark
 from hapticd.paths import directory
 from tests.daemon.running import Daemon
 from tests.drivers.plugin import write_module
+from tests.ports import free_port
 
 HAPTICD = str(Path(sys.executable).with_name("hapticd"))
 GOOD = str(directory("config") / "hapticd.toml")
@@ -195,7 +196,7 @@ def test_a_driver_that_is_named_by_its_module_is_asked_like_any_other(
 
 
 def test_a_running_daemon_is_seen_and_not_delayed() -> None:
-    with Daemon('[telemetry]\ntcp = "tcp://127.0.0.1:19873"\n') as daemon:
+    with Daemon(f'[telemetry]\ntcp = "tcp://127.0.0.1:{free_port()}"\n') as daemon:
         daemon.wait_ready()
         directory = str(daemon.directory / "run")
         done = doctor("--config", str(daemon.config), "--json", HAPTICD_RUNTIME_DIR=directory)

@@ -24,6 +24,7 @@ from hapticd.keys.store import KeyDirectory
 from hapticd.paths import directory
 from hapticd.supervisor.lock import InstanceLock
 from tests.doctor.machine import says
+from tests.ports import free_port
 
 
 @pytest.fixture
@@ -149,8 +150,9 @@ def test_a_path_longer_than_a_socket_address_is_refused_before_zeromq_does(tmp_p
 
 
 def test_an_endpoint_is_free_or_taken() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        endpoint = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+    port = free_port()
+    endpoint = f"tcp://127.0.0.1:{port}"
+    with socket.create_server(("127.0.0.1", port)):
         (mend, *_) = says(endpoints.tcp({"control.tcp": endpoint}, 0), "problem", "taken by another").mend
         assert "ss -ltnp" in mend
         assert "another control.tcp" in mend

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import socket
 import subprocess
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from hapticd.keys.file import Key, new_pair, write
 from hapticd.keys.store import KeyDirectory
 from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, Daemon, Subscriber, gone, wait_until
+from tests.ports import free_port
 from tests.remote.stage import CONFIG, driven, hold, remote_pid, runtime
 
 NOTHING_TO_DRIVE = CONFIG[: CONFIG.index("[[scene.couplings]]")]
@@ -123,13 +123,6 @@ def test_one_that_hangs_is_replaced() -> None:
             assert "stood still for more than 5 s" in lost["text"]
             hold(tool, 0.001)
             assert gone(pid)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @pytest.fixture

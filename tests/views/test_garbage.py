@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from hapticd.client.commands import command
 from hapticd_views.knocking import MOST_WAITING
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
-from tests.daemon.test_flood import descriptors, flood, free_port, resident_mb
+from tests.daemon.test_flood import descriptors, flood, resident_mb
 from tests.examples import examples
+from tests.ports import free_port
 from tests.remote.stage import remote_pid
 from tests.views.dashboard.served import Served as Dashboard
 from tests.views.gateway.served import Served as Gateway

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import socket
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 from tests.daemon.running import HAPTICD
+from tests.ports import free_port
 
 
 class Served:
@@ -22,8 +22,7 @@ class Served:
     """
 
     def __init__(self, runtime: Path, *arguments: str, prefix: Sequence[str] = ()) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as taken:
-            self.port = taken.getsockname()[1]
+        self.port = free_port()
         self.process = subprocess.Popen(
             [*prefix, HAPTICD, "dashboard", "--port", str(self.port), *arguments],
             env={**os.environ, "HAPTICD_RUNTIME_DIR": str(runtime)},

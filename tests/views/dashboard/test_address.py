@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import socket
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
@@ -15,6 +14,7 @@ from hapticd.errors import ClientError
 from hapticd_views.address import Address
 from hapticd_views.dashboard.server import Dashboard
 from hapticd_views.dashboard.target import Target
+from tests.ports import free_port
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "", "lab.example", "127.0.0.1:80"])
@@ -53,8 +53,7 @@ async def _first(connection: ClientConnection, token: str) -> str:
 
 def test_off_loopback_watching_takes_the_token() -> None:
     """The address is a loopback one all the same: what it is taken for is what counts."""
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        address = Address("127.0.0.1", taken.getsockname()[1])
+    address = Address("127.0.0.1", free_port())
     address.is_loopback = False
 
     async def heard() -> list[str]:

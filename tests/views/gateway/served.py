@@ -14,6 +14,7 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 
 from tests.daemon.running import HAPTICD
+from tests.ports import free_port
 
 PATIENCE_S = 30.0
 
@@ -27,8 +28,7 @@ class Served:
     """
 
     def __init__(self, runtime: Path, *arguments: str) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as taken:
-            self.port: int = taken.getsockname()[1]
+        self.port = free_port()
         self.url = f"ws://127.0.0.1:{self.port}"
         self.log = runtime.parent / f"gateway-{self.port}"
         with self.log.open("w") as log:
