@@ -313,7 +313,8 @@ def test_what_needs_it_disarmed_waits_for_the_ramp_of_a_disarming_just_before(
     bench.ticks(200)
     assert bench.ask(do="disarm") == ""
     bench.ticks(1)
-    assert bench.tick.guard.mode is Mode.RELEASING
+    ramping = bench.tick.guard.mode
+    assert ramping is Mode.RELEASING
     assert code not in bench.told()
     assert bench.ask(do=do) == ""
     assert code in bench.told()
