@@ -8,13 +8,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Literal, Self
 
-from hapticd.driver import Driver
+from hapticd_drivers.motors.driver import MotorDriver
 from tests.drivers.motors.shaft import Shaft
 from tests.drivers.motors.wire import Frames, SocketEnd, TtyEnd
 from tests.drivers.urgent import be_urgent
 
 TICK_S = 0.001
 PATIENCE_S = 3.0
+"""How long a driver waits for a controller that is silent, in tests of something else."""
+
+MARK = 0x7EE
+"""A frame that is for no controller: what was sent before it has come when it has."""
 
 
 class Controller(ABC):
@@ -71,7 +75,7 @@ class Bench:
 
     Attributes:
         spoil: what becomes of the frames that controllers send.
-        heard: frames that have come.
+        marks: frames that have come and were only to show that what was sent before them has.
         idle_passes: a millisecond passes for each that the computer says nothing, at the pace "frames" as well.
     """
 
@@ -81,7 +85,7 @@ class Bench:
         self.end = end
         self.controllers = controllers
         self.spoil: Callable[[Frames], Frames] = list
-        self.heard = 0
+        self.marks = 0
         self.idle_passes = False
         self.lock = threading.RLock()
         self._pace = pace
@@ -109,14 +113,14 @@ class Bench:
             for _ in range(round(duration_s / TICK_S)):
                 self._advance(TICK_S)
 
-    def settle(self, driver: Driver[Any]) -> None:
-        """Return when all that the driver has sent has come, and what it caused has been sent."""
-        end_s = time.monotonic() + PATIENCE_S
-        heard = -1
-        while heard != self.heard:
-            heard = self.heard
-            time.sleep(0.003)
-            assert time.monotonic() < end_s
+    def settle(self, driver: MotorDriver[Any]) -> None:
+        """Return when all that the driver, which is open, has sent has come, and what it caused has been sent."""
+        end_s = time.monotonic() + 10.0 * PATIENCE_S
+        marks = self.marks
+        driver._opened().link.send(MARK, b"")
+        while self.marks == marks:
+            assert time.monotonic() < end_s, "the controllers have not heard the driver"
+            time.sleep(0.0005)
 
     def _serve(self) -> None:
         be_urgent()
@@ -132,11 +136,13 @@ class Bench:
                     self._take(identifier, data)
                 if frames:
                     self._heard_ns = now_ns
-                    self.heard += len(frames)
                 elif self._pace == "frames" and now_ns - self._heard_ns > 5_000_000:
                     self._idle()
 
     def _take(self, identifier: int, data: bytes) -> None:
+        if identifier == MARK:
+            self.marks += 1
+            return
         first = self.controllers[0]
         if self._pace == "frames" and first.is_tick(identifier):
             self._advance(TICK_S)

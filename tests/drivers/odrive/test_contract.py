@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,6 +30,5 @@ class TestOdrive(DriverContract):
             yield made.driver()
 
     def force_on_device(self, driver: Any) -> Sequence[float]:
-        time.sleep(0.002)
         self.lab.bench.settle(driver)
         return [one.torque_n_m / one.shaft.radius_m for one in self.lab.controllers]
