@@ -14,7 +14,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from _pytest.runner import runtestprotocol
+
+from tests import standstill
 
 REPEAT = int(os.environ.get("REPEAT", "1"))
 _SPIN = "import os; os.sched_setaffinity(0, {{{cpu}}})\nwhile os.getppid() == {parent}: pass"
@@ -40,7 +41,7 @@ def repeated(item: pytest.Item, next_item: pytest.Item | None) -> bool:
     hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     for number in range(REPEAT):
         before = _started
-        reports = runtestprotocol(item, nextitem=next_item, log=False)
+        reports = standstill.reports(item, next_item)
         if _started > before or item.nodeid in _times:
             _times[item.nodeid] = number + 1
         failed = any(report.failed for report in reports)

@@ -75,15 +75,20 @@ def run(item: pytest.Item, next_item: pytest.Item | None) -> bool:
     """Run a test, and once more if it fails and the computer stood still."""
     hook = item.ihook
     hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-    began_s = time.monotonic()
-    reports = runtestprotocol(item, nextitem=next_item, log=False)
-    still_s = longest_s(began_s) if any(report.failed for report in reports) else 0.0
-    if still_s:
-        reports = runtestprotocol(item, nextitem=next_item, log=False)
-        said = f"{item.nodeid} ran twice: a processor stood still for {still_s * 1e3:.0f} ms"
-        for report in reports:
-            report.user_properties.append(("prints", said))
-    for report in reports:
+    for report in reports(item, next_item):
         hook.pytest_runtest_logreport(report=report)
     hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+def reports(item: pytest.Item, next_item: pytest.Item | None) -> list[pytest.TestReport]:
+    """What came of a test, the second time if it failed and the computer stood still."""
+    began_s = time.monotonic()
+    told = runtestprotocol(item, nextitem=next_item, log=False)
+    still_s = longest_s(began_s) if any(report.failed for report in told) else 0.0
+    if still_s:
+        told = runtestprotocol(item, nextitem=next_item, log=False)
+        said = f"{item.nodeid} ran twice: a processor stood still for {still_s * 1e3:.0f} ms"
+        for report in told:
+            report.user_properties.append(("prints", said))
+    return told

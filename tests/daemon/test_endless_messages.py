@@ -144,17 +144,17 @@ def test_a_flood_that_never_becomes_a_message_does_not_keep_a_processor_at_real_
                 pass
 
     with contextlib.ExitStack() as held:
-        threads = []
-        for _ in range(SENDERS):
-            raw = held.enter_context(connected(daemon, "scene", b"DEALER"))
-            raw.settimeout(1.0)
-            threads += [threading.Thread(target=say, args=(raw,)) for say in (ping, pong)]
+        raws = [held.enter_context(connected(daemon, "scene", b"DEALER")) for _ in range(SENDERS)]
+        threads = [threading.Thread(target=say, args=(raw,)) for raw in raws for say in (ping, pong)]
         for thread in threads:
             thread.start()
         try:
             wait_until(lambda: classes(pid) == {os.SCHED_OTHER}, "an ordinary process")
         finally:
             over.set()
+            for raw in raws:
+                with contextlib.suppress(OSError):  # it was ended
+                    raw.shutdown(socket.SHUT_RDWR)
             for thread in threads:
                 thread.join()
     wait_until(lambda: classes(pid) == before, "the flood to be over")

@@ -16,6 +16,15 @@ elif "hapticd.loop.process" in sys.orig_argv:
     Path(__file__).with_name("control").write_text(str(time.monotonic_ns()))
 """
 
+LATE = """
+    began_s = time.monotonic()
+    while not Path(__file__).with_name("control").exists() and time.monotonic() < began_s + 8.0:
+        time.sleep(0.01)
+    time.sleep(2.0)
+    Path(__file__).with_name("helper").write_text(str(time.monotonic_ns()))
+"""
+"""Ready two seconds after the loop's process has begun, which needs less than one to open its device."""
+
 OPENED = """
 import time
 from pathlib import Path
@@ -29,8 +38,7 @@ class Opened(Loopback):
 
 def test_no_device_is_opened_before_the_helper_is_ready(tmp_path: Path) -> None:
     """The loop's process imports what it needs in the meantime, and waits."""
-    late = 'time.sleep(3.0); Path(__file__).with_name("helper").write_text(str(time.monotonic_ns()))'
-    (tmp_path / "sitecustomize.py").write_text(WITNESS.replace("HELPER", late))
+    (tmp_path / "sitecustomize.py").write_text(WITNESS.replace("HELPER", LATE))
     (tmp_path / "lab").mkdir()
     (tmp_path / "lab/__init__.py").touch()
     (tmp_path / "lab/opened.py").write_text(OPENED)

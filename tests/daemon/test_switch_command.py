@@ -29,7 +29,8 @@ def switch(daemon: Daemon, *arguments: str | Path) -> subprocess.CompletedProces
 
 
 def test_the_daemon_is_asked_which_file_it_runs_and_takes_the_edit_over(daemon: Daemon) -> None:
-    with Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
+    with Subscriber(daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is heard
         done = switch(daemon, "tdpa", "--set", "damping_cap_n_s_per_m=20")
         assert (done.returncode, done.stderr) == (0, "")
         assert "has taken it over" in done.stdout

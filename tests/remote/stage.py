@@ -16,6 +16,7 @@ from tests.daemon.running import Daemon, wait_until
 
 SCRIPT = Path(__file__).with_name("scene_client.py")
 MAX_FORCE_N = 3.0
+HOLD_S = 0.3
 
 CONFIG = f"""
 [device.options]
@@ -26,7 +27,7 @@ hand = {{ damping_n_s_per_m = 5.0 }}
 name = "tool"
 stiffness_n_per_m = 300.0
 max_force_n = {MAX_FORCE_N}
-hold_s = 0.3
+hold_s = {HOLD_S}
 """
 
 

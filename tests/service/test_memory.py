@@ -87,7 +87,9 @@ def test_beyond_the_bound_the_force_ends_and_systemd_starts_it_again(machine: Ma
     packages = next(machine.path("/opt/hapticd/lib").glob("python3*")) / "site-packages"
     (packages / "leaking_lab").mkdir()
     (packages / "leaking_lab/leaking.py").write_text(LEAKING_LAW)
-    with Service(machine, config=LEAKING) as service, Subscriber(service.endpoint, "hapticd/event") as subscriber:
+    topics = ("hapticd/event", "hapticd/status")
+    with Service(machine, config=LEAKING) as service, Subscriber(service.endpoint, *topics) as subscriber:
+        subscriber.until("hapticd/status")  # it is heard
         service.write(PRESSED)  # for the next one
         with group_of(service):
             lost = subscriber.until("hapticd/event", code=EventCode.CONTROL_LOST)

@@ -197,7 +197,8 @@ def test_a_reload_of_a_bad_file_fails_and_changes_nothing(service: Service) -> N
 
 
 def test_a_stopped_control_process_is_released_and_the_service_restarted(service: Service) -> None:
-    with Subscriber(service.endpoint, "hapticd/event") as subscriber:
+    with Subscriber(service.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is heard
         os.kill(service.control, signal.SIGSTOP)
         event = subscriber.until("hapticd/event", code=EventCode.CONTROL_LOST)
         assert "without force" in event["text"]

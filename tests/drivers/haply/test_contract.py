@@ -26,7 +26,7 @@ class TestInverse3(DriverContract):
             made.close()
 
     def force_on_device(self, driver: Any) -> Sequence[float]:
-        end_s = time.monotonic() + 5.0
+        end_s = time.monotonic() + 30.0
         while driver._courier.waiting:
             assert time.monotonic() < end_s
             time.sleep(0.001)

@@ -132,7 +132,7 @@ def test_a_message_that_makes_no_sense_is_counted_and_not_believed(service: Fake
     service.spoil.append(spoilt)
     driver.write([0.0, 0.0, 0.0])
     driver._state_wait_s = 0.05
-    end_s = time.monotonic() + 5.0
+    end_s = time.monotonic() + 30.0
     while not driver.metrics[BAD] and time.monotonic() < end_s:
         assert driver.read().position_m == pytest.approx(x_m, abs=1e-3)
     assert driver.metrics[BAD] == 1
@@ -144,7 +144,7 @@ def test_a_place_that_is_no_number_is_no_place(service: FakeService) -> None:
     service.cursor.x_m[0] = math.nan  # Python writes NaN into JSON
     driver.write([0.0, 0.0, 0.0])
     driver._state_wait_s = 0.05
-    end_s = time.monotonic() + 5.0
+    end_s = time.monotonic() + 30.0
     while not driver.metrics[BAD] and time.monotonic() < end_s:
         assert all(map(math.isfinite, driver.read().position_m))
     assert driver.metrics[BAD] == 1
@@ -166,7 +166,7 @@ def test_either_name_of_a_force_arrives_where_the_service_knows_it(service: Fake
     driver.enable()
     driver.write([0.5, 0.0, 0.0])
     driver.read()
-    end_s = time.monotonic() + 5.0
+    end_s = time.monotonic() + 30.0
     while service.cursor.force_n != [0.5, 0.0, 0.0]:
         assert time.monotonic() < end_s
         time.sleep(0.001)

@@ -124,7 +124,7 @@ def push(daemon: Daemon, bench: Bench) -> None:
     for _ in range(ATTEMPTS):
         let_go_and_arm(daemon, bench)
         press(bench)
-        end_s = time.monotonic() + 5.0
+        end_s = time.monotonic() + 10.0
         while time.monotonic() < end_s:
             if bench.controllers[0].torque_n_m != 0.0:
                 return

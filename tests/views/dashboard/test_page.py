@@ -171,7 +171,8 @@ def test_a_part_of_what_is_held_is_looked_at_closely(page: Page) -> None:
 
 
 def test_disarm_and_arm_are_one_press(page: Page, daemon: Daemon) -> None:
-    with Subscriber(daemon.endpoint, "hapticd/event") as subscriber:
+    with Subscriber(daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
+        subscriber.until("hapticd/status")  # it is heard
         page.click("#disarm")
         subscriber.until("hapticd/event", code=EventCode.DISARMED)
         state(page, "Disarmed")
