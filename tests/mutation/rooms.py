@@ -120,8 +120,8 @@ ROOMS = {
     **{
         name: Room(
             (f"controllers/hapticd_controllers/{name}.py",),
-            ("tests/controllers/test_energy_cycle.py", "tests/controllers/test_felt_mass.py", *LAW_TESTS),
-            "energy_cycle or energy-cycle or felt_mass",
+            (*(f"tests/controllers/test_{law}.py" for law in ("felt_mass", "late_cycle", "energy_cycle")), *LAW_TESTS),
+            "energy_cycle or energy-cycle or late_cycle or late-cycle or felt_mass",
         )
         for name in ("cycle_sums", "felt_mass")
     },

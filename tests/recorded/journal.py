@@ -13,6 +13,7 @@ import json
 import math
 import re
 from collections import defaultdict
+from collections.abc import Iterable
 from pathlib import Path
 
 PLACE = Path(__file__).parent
@@ -84,6 +85,14 @@ class Journal:
             name: [float(f"{each:.12g}") for each in (self._largest[name], *sums)]
             for name, sums in self._sums.items()
         }  # fmt: skip
+
+
+def forget_others(names: Iterable[str]) -> None:
+    """Drop what was written down of runs that are none of these."""
+    kept = {_file(name) for name in names}
+    for file in (PLACE / "journals").iterdir():
+        if file not in kept:
+            file.unlink()
 
 
 def _file(name: str) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from tests.recorded.courses import FOLLOWED
 from tests.recorded.journal import Journal
 from tests.recorded.laws import PRESSES
 from tests.recorded.loops import run
@@ -14,5 +15,6 @@ from tests.recorded.walks import WALKS
 RUNS: dict[str, Callable[[], Journal]] = {
     **WALKS,
     **PRESSES,
+    **FOLLOWED,
     **{name: partial(run, script) for name, script in SCRIPTS.items()},
 }
