@@ -80,6 +80,25 @@ def test_what_is_said_of_a_port_is_taken_once_and_by_that_port(
     assert reader.seen == shared.words[REMOTE]
 
 
+def test_the_word_counts_the_updates_and_a_tick_without_one_looks_at_nothing_else(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    assert (shared.words[REMOTE], reader.seen) == (0, 0)
+    writer = SlotWriter(shared, PORTS)
+    assert shared.words[REMOTE] == 0
+    for number in range(3):
+        writer.write(number % 2, at(0.1))
+        assert shared.words[REMOTE] == number + 1
+        assert reader.seen == number
+        reader.take()
+        assert reader.seen == number + 1
+    SlotWriter(shared, PORTS)
+    assert shared.words[REMOTE] == 3
+    shared.remote_words[0] += 1
+    SlotWriter(shared, PORTS)
+    assert shared.words[REMOTE] == 4, "what was left half done is news"
+
+
 def test_of_several_updates_the_latest_is_taken(
     shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
 ) -> None:

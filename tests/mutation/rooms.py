@@ -98,6 +98,7 @@ ROOMS = {
         ),
         (
             *(f"tests/remote/test_{name}.py" for name in ("message", "refusals", "leased_port", "scene_socket")),
+            *(f"tests/remote/test_{name}.py" for name in ("doors", "state_map")),
             "tests/loop/test_remote_slots.py",
         ),
     ),

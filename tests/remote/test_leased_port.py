@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from hapticd.remote.leased_port import LeasedPort, NotTakenError, Sender
-from hapticd.remote.message import WrongMessageError
+from hapticd.remote.message import LARGEST_NUMBER, WrongMessageError
 from hapticd.tick.remote.update import POSITION, RELEASED, STIFFNESS
 from tests.remote.heard import TOOL
 
@@ -64,9 +65,65 @@ def test_letting_go_is_told_and_frees_the_name(port: LeasedPort) -> None:
         port.take({"release": True}, TWO, 1, MS)
     assert port.take({"release": True}, ONE, 1, MS)
     assert port.update.said == POSITION | STIFFNESS | RELEASED
+    assert (port.update.seq, port.update.received_ns, port.update.sent_ns) == (6, MS, 0), "it is news for the loop"
     assert port.owner_at(MS) is None
     assert not port.take({"release": True}, ONE, 1, 2 * MS), "it has nothing to let go"
     assert say(port, TWO, 2, 1)
+
+
+def test_the_last_number_that_there_is_stays_when_the_name_is_let_go(port: LeasedPort) -> None:
+    say(port, ONE, 0, LARGEST_NUMBER - 1, position_m=[0.0], sent_ns=1)
+    assert port.take({"release": True}, ONE, 1, MS)
+    assert port.update.seq == LARGEST_NUMBER
+    assert port.update.sent_ns == 0
+
+
+@pytest.mark.parametrize("says", [False, 1, "yes", None])
+def test_only_true_lets_go(port: LeasedPort, says: object) -> None:
+    say(port, ONE, 0, 1)
+    with pytest.raises(WrongMessageError, match="has no release"):
+        port.take({"seq": 2, "release": says}, ONE, 1, MS)
+    assert port.owner_at(MS) is ONE
+
+
+def test_the_owner_is_who_has_spoken_last_under_its_identity(port: LeasedPort) -> None:
+    again = replace(ONE, descriptor=11, inode=110)
+    say(port, ONE, 0, 1)
+    say(port, again, 1, 2)
+    assert port.owner_at(MS) is again
+    assert port.owner_at(1001 * MS) is again
+    assert port.owner_at(1001 * MS + 1) is None
+
+
+def test_of_the_messages_under_way_the_newest_are_remembered_and_none_of_another_owner(port: LeasedPort) -> None:
+    for seq in range(1, 101):
+        say(port, ONE, 0, seq, state_seq=0)
+    port.now_in_force(20, 1, MS, MS)
+    assert sum(port.ages.counts) == 0
+    for seq in range(101, 165):
+        say(port, ONE, 0, seq, state_seq=0)
+    port.now_in_force(101, 2, MS, MS)
+    assert sum(port.ages.counts) == 1, "the oldest of 64"
+    port.now_in_force(101, 3, MS, MS)
+    assert sum(port.ages.counts) == 1
+    assert say(port, TWO, 2000, 163)
+    port.now_in_force(163, 2001, 2001 * MS, MS)
+    assert sum(port.ages.counts) == 2
+    assert sum(port.round_trips.counts) == 1, "the other one's answered a state, this one's none"
+
+
+@pytest.mark.parametrize(("state_seq", "counts"), [(0, 1), (101, 1), (102, 0)])
+def test_a_tick_that_is_still_to_come_has_not_been_answered(port: LeasedPort, state_seq: int, counts: int) -> None:
+    say(port, ONE, 100, 1, state_seq=state_seq)
+    port.now_in_force(1, 101, 101 * MS, MS)
+    assert sum(port.round_trips.counts) == counts
+
+
+@pytest.mark.parametrize(("before_ns", "known"), [(-1, False), (0, True), (10**10, True), (10**10 + 1, False)])
+def test_a_time_of_sending_that_cannot_be_is_not_believed(port: LeasedPort, before_ns: int, known: bool) -> None:
+    now_ns = 20_000 * MS
+    say(port, ONE, 20_000, 1, sent_ns=now_ns - before_ns)
+    assert port.update.sent_ns == (now_ns - before_ns if known else 0)
 
 
 def test_what_is_refused_makes_no_owner_and_keeps_none(port: LeasedPort) -> None:

@@ -10,8 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticd.config.ports import PortLimits
-from hapticd.remote.message import WrongMessageError, examine, merge
+from hapticd.remote.message import (
+    FARTHEST_M,
+    FASTEST_TURN_RAD_PER_S,
+    LARGEST_NUMBER,
+    WrongMessageError,
+    examine,
+    merge,
+)
 from hapticd.tick.remote.update import (
+    DAMPING,
     FORCE,
     ORIENTATION,
     POSITION,
@@ -90,6 +98,97 @@ def test_a_refusal_says_what_is_wrong(port: PortLimits, fields: dict[str, Any], 
     with pytest.raises(WrongMessageError) as refused:
         taken(port, **fields)
     assert str(refused.value) == text
+
+
+@pytest.mark.parametrize(
+    ("port", "fields"),
+    [
+        (TOOL, {"stiffness_n_per_m": 0}),
+        (TOOL, {"stiffness_n_per_m": 0.25}),
+        (TOOL, {"stiffness_n_per_m": 500.0}),
+        (TOOL, {"damping_n_s_per_m": 5.0}),
+        (TOOL, {"position_m": [FARTHEST_M]}),
+        (TOOL, {"position_m": (-FARTHEST_M,)}),
+        (BALL, {"angular_velocity_rad_per_s": [FASTEST_TURN_RAD_PER_S, -FASTEST_TURN_RAD_PER_S, 0.0]}),
+        (BALL, {"orientation": [1e-3, 0.0, 0.0, 0.0]}),
+        (BALL, {"orientation": [0.0, 0.0, -1e3, 0.0]}),
+        (TOOL, {"seq": 0}),
+        (TOOL, {"seq": LARGEST_NUMBER - 1, "sent_ns": LARGEST_NUMBER - 1, "state_seq": LARGEST_NUMBER - 1}),
+    ],
+)
+def test_what_is_just_within_a_limit_is_taken_as_it_is(port: PortLimits, fields: dict[str, Any]) -> None:
+    said = examine({"seq": 1, **fields}, port, 1)
+    update = taken(port, **fields)
+    for key, value in fields.items():
+        if key in ("seq", "sent_ns", "state_seq"):
+            assert getattr(said, key) == value
+        else:
+            told = getattr(update, key)
+            assert (told[: len(value)] if isinstance(value, list | tuple) else told) == (
+                list(value) if isinstance(value, tuple) else value
+            )
+
+
+@pytest.mark.parametrize(
+    ("port", "key", "value"),
+    [
+        (TOOL, "stiffness_n_per_m", -1e-9),
+        (TOOL, "damping_n_s_per_m", 5.001),
+        (TOOL, "position_m", [10.001]),
+        (TOOL, "position_m", [-10.001]),
+        (TOOL, "position_m", [True]),
+        (TOOL, "position_m", "0"),
+        (TOOL, "position_m", 0.0),
+        (TOOL, "position_m", []),
+        (TOOL, "orientation", [1.0, 0.0, 0.0, 0.0]),
+        (BALL, "force_n", [1.0, 0.0, 0.0]),
+        (BALL, "orientation", [1.0, 0.0, 0.0]),
+        (BALL, "orientation", [0.9e-3, 0.0, 0.0, 0.0]),
+        (BALL, "orientation", [1.1e3, 0.0, 0.0, 0.0]),
+        (BALL, "angular_velocity_rad_per_s", [0.0, -100.1, 0.0]),
+        (FIELD, "force_n", [math.inf]),
+        (FIELD, "x" * 100, 1),
+    ],
+)
+def test_what_is_just_beyond_a_limit_is_refused_and_its_key_named(port: PortLimits, key: str, value: object) -> None:
+    with pytest.raises(WrongMessageError) as refused:
+        examine({"seq": 1, key: value}, port, 1)
+    assert refused.value.key == key[:40]
+
+
+@pytest.mark.parametrize("key", ["seq", "sent_ns", "state_seq"])
+@pytest.mark.parametrize("value", [-1, LARGEST_NUMBER, True, 1.0, "1", None])
+def test_what_is_no_number_of_a_message_is_refused(key: str, value: object) -> None:
+    with pytest.raises(WrongMessageError, match=f"{key}: must be a whole number, 0 or more"):
+        examine({"seq": 1, key: value}, TOOL, 1)
+
+
+def test_a_message_that_does_not_say_when_and_to_what_it_was_sent_says_nothing_of_that() -> None:
+    said = examine({"name": "tool", "seq": 4}, TOOL, 1)
+    assert (said.seq, said.sent_ns, said.state_seq, said.values, said.bits) == (4, 0, -1, {}, 0)
+
+
+def test_each_key_is_said_by_a_bit_of_its_own() -> None:
+    said = [
+        taken(TOOL, position_m=[0.1]).said,
+        taken(TOOL, velocity_m_per_s=[0.1]).said,
+        taken(TOOL, stiffness_n_per_m=1.0).said,
+        taken(TOOL, damping_n_s_per_m=1.0).said,
+        taken(FIELD, force_n=[0.1]).said,
+        taken(BALL, orientation=[1, 0, 0, 0]).said,
+        taken(BALL, angular_velocity_rad_per_s=[0, 0, 1]).said,
+    ]
+    assert said == [POSITION, VELOCITY, STIFFNESS, DAMPING, FORCE, ORIENTATION, TURNING]
+    assert len({*said, RELEASED}) == 8
+
+
+def test_a_velocity_beyond_the_limit_keeps_its_direction() -> None:
+    assert taken(TOOL, axes=2, velocity_m_per_s=[-3.0, 4.0]).velocity_m_per_s[:2] == pytest.approx([-0.6, 0.8])
+    assert taken(TOOL, axes=2, velocity_m_per_s=[0.6, 0.7]).velocity_m_per_s[:2] == [0.6, 0.7]
+    assert taken(TOOL, axes=2, velocity_m_per_s=[0.9, -0.9]).velocity_m_per_s[:2] == pytest.approx(
+        [0.5**0.5, -(0.5**0.5)]
+    )
+    assert taken(BALL, axes=1, velocity_m_per_s=[0.0, 0.0, 2.0]).velocity_m_per_s == [0.0, 0.0, 1.0]
 
 
 def test_a_force_beyond_the_limit_keeps_its_direction() -> None:

@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -235,6 +236,51 @@ def test_after_a_reload_a_name_keeps_its_owner_and_another_list_is_not_mixed_up(
         assert "belongs to" in two.answer()["text"]
         one.say(name="field", seq=8, force_n=[1.5])
         scene.until(lambda: scene.ports[1].heard[-1].seq == 8)
+
+
+def test_each_port_has_the_owner_who_drives_it_until_it_is_gone(scene: Scene) -> None:
+    me = f"user {os.getuid()}, process {os.getpid()}"
+    scene.serve(3600.0)
+    assert scene.socket.owners() == ["", ""]
+    with Talker(scene) as one:
+        one.say(name="field", seq=5, force_n=[1.0])
+        scene.until(lambda: scene.ports[1].heard)
+        assert scene.socket.owners() == ["", me]
+        with Talker(scene) as two:
+            two.say(name="tool", seq=1, position_m=[0.01])
+            scene.until(lambda: scene.ports[0].heard)
+            assert scene.socket.owners() == [me, me]
+        scene.until(lambda: scene.socket.owners() == ["", me])
+    scene.until(lambda: scene.socket.owners() == ["", ""])
+
+
+def test_a_name_that_is_of_another_kind_now_belongs_to_no_one(scene: Scene) -> None:
+    with Talker(scene) as one:
+        one.say(name="tool", seq=1, position_m=[0.01])
+        scene.until(lambda: scene.ports[0].heard)
+        before = scene.socket.ports["tool"]
+        tighter, other = replace(TOOL, max_force_n=1.0), replace(TOOL, kind="force")
+        for limits, kept in ((tighter, True), (other, False)):
+            writer = SlotWriter(scene.shared, [(limits.name, limits.kind)])
+            scene.socket.serve([limits], writer, 2.5, ("x", "y"), 500.0)
+            now = scene.socket.ports["tool"]
+            assert (now is before) == kept
+            assert (now.limits, now.lease_s) == (limits, 2.5)
+            one.say(hello=True)
+            hello = one.answer()
+            assert (hello["rate_hz"], hello["axes"], hello["lease_s"]) == (500.0, ["x", "y"], 2.5)
+            assert [port["kind"] for port in hello["ports"]] == [limits.kind]
+
+
+def test_a_refusal_names_the_port_and_the_key(scene: Scene) -> None:
+    with Talker(scene) as one, Talker(scene) as two:
+        one.say(name="tool", seq=1, position_m=[0.01], stiffness_n_per_m=-1)
+        refusal = one.answer()
+        assert (refusal["ok"], refusal["name"], refusal["key"]) == (False, "tool", "stiffness_n_per_m")
+        assert scene.socket.ports["tool"].refused == 1
+        two.say(name="x" * 100, seq=1)
+        refusal = two.answer()
+        assert (refusal["name"], refusal["key"]) == ("x" * 40, "")
 
 
 def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
