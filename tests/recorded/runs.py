@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from tests.recorded.clients import HEARD
 from tests.recorded.courses import FOLLOWED
 from tests.recorded.journal import Journal
 from tests.recorded.laws import PRESSES
@@ -16,5 +17,6 @@ RUNS: dict[str, Callable[[], Journal]] = {
     **WALKS,
     **PRESSES,
     **FOLLOWED,
+    **HEARD,
     **{name: partial(run, script) for name, script in SCRIPTS.items()},
 }

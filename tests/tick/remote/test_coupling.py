@@ -261,6 +261,19 @@ def test_it_goes_on_under_its_name_through_a_reload_and_fades_out_with_the_scene
     assert rig.unbalanced_j() < 1e-9
 
 
+@pytest.mark.parametrize("most_n", [MOST_N + 0.8, MOST_N - 0.8])
+def test_another_limit_is_gone_over_to_by_the_ramp_however_near_it_is(most_n: float) -> None:
+    rig = Rig()
+    assert held_at(rig, [0.02], 200) == [pytest.approx(MOST_N)]
+    rig.switch(COUPLING.replace(f"max_force_n = {MOST_N}", f"max_force_n = {most_n}"))
+    forces = [rig.force[0]]
+    for _ in range(100):
+        forces += held_at(rig, [0.02], 1)
+    steps = [after - before for before, after in pairwise(forces)]
+    assert max(map(abs, steps)) <= 0.8 * PERIOD_S / RAMP_S * (1.0 + 1e-6)
+    assert forces[-1] == pytest.approx(most_n)
+
+
 def test_another_law_for_walls_is_none_for_a_coupling() -> None:
     rig = Rig(COUPLING + WALL)
     held_at(rig, [2e-3], 300)

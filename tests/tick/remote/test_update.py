@@ -7,7 +7,21 @@ import struct
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.tick.remote.update import PACKED_BYTES, SLOT_BYTES, Update, pack, unpack
+from hapticd.tick.remote.update import (
+    DAMPING,
+    FORCE,
+    ORIENTATION,
+    PACKED_BYTES,
+    POSITION,
+    RELEASED,
+    SLOT_BYTES,
+    STIFFNESS,
+    TURNING,
+    VELOCITY,
+    Update,
+    pack,
+    unpack,
+)
 
 WORDS = st.integers(-(1 << 63), (1 << 63) - 1)
 NUMBERS = st.floats(allow_nan=False)
@@ -61,3 +75,8 @@ def test_an_update_lies_as_numbers_of_eight_bytes_little_end_first() -> None:
         "stiffness_n_per_m": 16.0,
         "damping_n_s_per_m": 17.0,
     }
+
+
+def test_each_thing_that_may_be_said_has_a_bit_of_its_own() -> None:
+    bits = [POSITION, ORIENTATION, VELOCITY, TURNING, STIFFNESS, DAMPING, FORCE, RELEASED]
+    assert bits == [1 << at for at in range(8)]
