@@ -162,13 +162,19 @@ PORTS: dict[str, Course] = {
         1750,
     ),
     "a late device, too": Course(
-        3000, {**PORT, "heard": 10, "late": 1, "stiffness_n_per_m": 2.5e3, "resolution_m": 1e-6}, SWAYS, 1500
+        3000,
+        {**PORT, "heard": 10, "late": 1, "stiffness_n_per_m": 2.5e3, "resolution_m": 1e-6, "shakes": 0.2},
+        SWAYS,
+        1500,
     ),
     "small swings": Course(
         3000, {**PORT, "heard": 5, "stiffness_n_per_m": 3e3, "resolution_m": 5e-4, "hand_n": -1.0}, {}, 0, 20.0, 1e-3
     ),
     "a light device": Course(
-        3000, {**PORT, "mass_kg": 0.06, "viscous_n_s_per_m": 0.3, "heard": 8, "stiffness_n_per_m": 1e3}, SWAYS, 1500
+        3000,
+        {**PORT, "mass_kg": 0.06, "viscous_n_s_per_m": 0.3, "heard": 8, "stiffness_n_per_m": 1e3, "shakes": 0.3},
+        SWAYS,
+        1500,
     ),
 }
 """At what clients do."""
