@@ -45,6 +45,7 @@ class RequestHandler:
         self._session = session
         self._work: Generator[None, None, None] | None = None
         self._laws: dict[str, ModuleType] = {}
+        self._disarms = 0  # how often disarming had been asked for when the request was sent
         self.worker = Worker()
 
     def know(self, name: str, law: ModuleType) -> None:
@@ -61,7 +62,8 @@ class RequestHandler:
             if self._work is None:
                 request = shared.request()
                 do = request.pop("do")
-                if request.pop("disarm") != shared.words[DISARM] and do in ("arm", "calibrate"):
+                self._disarms = request.pop("disarm")
+                if self._withdrawn and do in ("arm", "calibrate"):
                     raise HapticdError(DISARMED_SINCE)
                 self._work = getattr(self, f"_do_{do}")(**request)
             next(self._work)
@@ -72,6 +74,11 @@ class RequestHandler:
             self._work = None
             text = str(error) if isinstance(error, HapticdError) else f"{type(error).__name__}: {error}"
             shared.answer(text or type(error).__name__)
+
+    @property
+    def _withdrawn(self) -> bool:
+        """Whether disarming was asked for after the request was sent."""
+        return self._session.shared.words[DISARM] != self._disarms
 
     def _do_arm(self) -> Generator[None, None, None]:
         if not self._session.arm():
@@ -90,6 +97,8 @@ class RequestHandler:
         """
         session = self._session
         yield from self._until_released()
+        if self._withdrawn:  # while it waited
+            raise HapticdError(DISARMED_SINCE)
         if session.tick.guard.mode is not Mode.DISARMED or session.driver.state is not DriverState.OPEN:
             raise HapticdError("calibration moves the arm by itself: `hapticd disarm` first")
         session.event(EventCode.CALIBRATING, "calibrating: the arm moves by itself")
@@ -102,11 +111,9 @@ class RequestHandler:
             except Exception as error:  # noqa: BLE001 - handed over to who asked
                 ended.append(error)
 
-        words = session.shared.words
-        disarmed = words[DISARM]
         self.worker.do(calibrate)
         while not ended:
-            if words[DISARM] != disarmed:
+            if self._withdrawn:
                 session.driver.call_off()
             yield
         if ended[0] is not None:

@@ -9,7 +9,7 @@ import pytest
 
 from hapticd.config.loading import parse
 from hapticd.errors import DeviceTimeoutError, DriverStateError
-from hapticd.loop.memory import DISARM, DISARMED, RECORDS, SharedMemory
+from hapticd.loop.memory import DISARM, DISARMED, DISARMED_SINCE, RECORDS, SharedMemory
 from hapticd.supervisor.request_queue import Answer, RequestQueue
 from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
@@ -167,6 +167,25 @@ class TestInTheLoop:
             requests.work()
         assert bench.shared.verdict() == "the calibration was called off"
         assert "called off" in bench.told()[EventCode.CALIBRATION_ENDED].text
+
+    def test_disarming_calls_a_calibration_off_that_waits_for_the_ramp_of_the_disarming_before(
+        self, bench: Bench, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        moved: list[bool] = []
+        monkeypatch.setattr(bench.driver, "_calibrate", lambda: moved.append(True))
+        bench.ticks(1)
+        assert bench.ask(do="arm") == ""
+        bench.ticks(100)
+        assert bench.ask(do="disarm") == ""
+        bench.shared.post({"do": "calibrate"})
+        bench.loop.requests.work()
+        assert not bench.answered
+        assert bench.ask(do="disarm") == ""
+        while not bench.answered:
+            bench.ticks(1)
+            bench.loop.requests.work()
+        assert bench.shared.verdict() == DISARMED_SINCE
+        assert moved == []
 
     def test_a_calibration_that_fails_by_itself_says_why(self, bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
         def calibrate() -> None:
