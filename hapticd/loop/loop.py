@@ -203,6 +203,7 @@ class ControlLoop:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
             if guard.mode is disarmed:
+                late = 0  # what was missed of a force that has been let go counts for no other
                 if driver.state is enabled:
                     driver.disable()
                 if self._stopping:
@@ -224,7 +225,8 @@ class ControlLoop:
                 skipped += behind
                 deadline_ns += behind * period_ns
                 words[SKIPPED] = session.skipped = skipped
-                late += behind
+                if guard.mode is not disarmed:
+                    late += behind
                 if late >= most_late and guard.mode is Mode.ARMED and not tick.info.simulated:
                     tick.fail(EventCode.LOOP_LATE, f"{late} more deadlines were missed than met")
                 elif behind >= BURST_TICKS and now_ns >= self._burst_due_ns:

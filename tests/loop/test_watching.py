@@ -124,6 +124,24 @@ def test_lateness_of_a_simulated_device_or_of_one_that_is_disarmed_takes_no_forc
     assert late(clock, slow) != []
 
 
+@pytest.mark.parametrize("auto_arm", [False, True], ids=["while it was disarmed", "of a force that was let go"])
+def test_deadlines_that_were_missed_before_it_was_armed_take_no_force_away(clock: Clock, auto_arm: bool) -> None:
+    """A computer that stood still for 5 s, and one more deadline that is missed after somebody has armed."""
+    started = Started(clock, auto_arm)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+
+    def each_tick(number: int) -> None:
+        missed_s = {10: 5.0, 300: 1.5e-3}.get(number, 0.0)
+        started.driver.before_read = lambda: clock.pass_s(missed_s)
+        if number == 200:
+            started.tick.guard.clear()
+            assert started.loop.session.arm()
+
+    started.run(each_tick, 400)
+    assert started.skipped == 5001
+    assert len(told(started, EventCode.LOOP_LATE)) == auto_arm
+
+
 @pytest.mark.parametrize("switched", [False, True], ids=["from the start", "after a switch"])
 def test_what_clients_drive_is_taken_and_told_when_it_is_let_go_and_when_it_is_back(
     clock: Clock, switched: bool
