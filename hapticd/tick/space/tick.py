@@ -105,6 +105,7 @@ class SpaceTick(ControlTick):
         changed: list[tuple[SolidContact, Solid, list[Channel]]] = []
         fading: list[tuple[SolidContact, list[tuple[Contact, RunningLaw]]]] = []
         new: list[SolidContact] = []
+        kept: list[tuple[SolidContact, Solid]] = []
         if scene is not None:
             solids = compile_objects(scene.objects, self.period_s)
             yield
@@ -118,7 +119,7 @@ class SpaceTick(ControlTick):
                 elif not solid.same_as(contact.solid):
                     changed.append((contact, solid, contact.rougher(solid, make)))
                 else:
-                    contact.solid.index, contact.solid.members = solid.index, solid.members
+                    kept.append((contact, solid))
                 there.append(contact)
                 yield
             fading = [(contact, _still(contact.channels)) for contact in known.values()]
@@ -136,6 +137,8 @@ class SpaceTick(ControlTick):
         yield from super().switch(scene, safety, make_law)
         # From here on nothing can fail.
         limit_n = self.guard.limit_n
+        for contact, solid in kept:
+            contact.solid.index, contact.solid.members = solid.index, solid.members
         for contact, still in fading:
             contact.let_go(limit_n)
             self._fading.append(contact)

@@ -90,6 +90,23 @@ def test_an_object_goes_on_under_its_name_wherever_it_stands_in_the_file() -> No
     assert contact.solid.index == 1
 
 
+@pytest.mark.parametrize("refused", [False, True])
+def test_until_a_switch_is_taken_ticks_tell_of_the_scene_that_is_there(refused: bool) -> None:
+    """A reader of the record of an object that its scene does not have ended the daemon."""
+    rig = pressed(ball())
+    before = rig.tick.solids[0].solid
+    wanted = config(ball("other", position_m=(0.2, 0.0, 0.0)) + ball(), safety="max_force_n = 900.0" if refused else "")
+    switching = rig.tick.switch(wanted.config.scene, wanted.config.safety)
+    slices = 0
+    with pytest.raises(ConfigError if refused else StopIteration):
+        while True:
+            next(switching)
+            slices += 1
+            assert (rig.tick.objects, before.index, before.members) == (1, 0, (0,))
+    assert slices > 1
+    assert (rig.tick.objects, before.index, before.members) == ((1, 0, (0,)) if refused else (2, 1, (1,)))
+
+
 def test_work_of_a_change_is_the_scenes_and_no_leak() -> None:
     rig = pressed(law="none").to((0.0, 0.0, 0.0292), 5)
     generated = rig.totals.ledger.generated_j
