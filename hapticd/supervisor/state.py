@@ -95,6 +95,7 @@ class DaemonState:
         self.loop.close()
         self.loop = loop
         self.requests = RequestQueue(loop.shared)
+        self.publisher.take_loop()
         self.serve_clients()
         self.status.expect(self.recovery.resume)
         away_s = time.monotonic() - self.recovery.lost_s

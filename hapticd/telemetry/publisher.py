@@ -151,6 +151,10 @@ class Publisher:
         self._send_batch()
         self._offset_ns = epoch_offset_ns
 
+    def take_loop(self) -> None:
+        """Publish of another loop from now on, which has touched nothing yet."""
+        self._objects = wire.Objects()
+
     def admit(self, ring: KeyRing) -> None:
         """Take other keys over; a client that is no longer listed is disconnected."""
         if self._gate is not None:

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import msgpack
 
-from hapticd.tick.contact_record import WallRecord
+from hapticd.tick.contact_record import SpaceRecord, WallRecord
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.record import TickRecord
 from hapticd.tick.remote.port_record import PortRecord, PortsRecord
@@ -131,10 +131,14 @@ def energy_map(record: TickRecord, timestamp: float) -> Map:
 
 
 class Objects:
-    """What is known of every object: a record has those in reach only, and of the others nothing changes."""
+    """What is known of every object: a record has those in reach only, and of the others nothing changes.
+
+    Where the list of objects has become another one, those that have not been in reach since are as good as new.
+    """
 
     def __init__(self) -> None:
         self._known: list[WallRecord] = []
+        self._listing = -1
 
     def see(self, record: TickRecord) -> Sequence[WallRecord]:
         """Walls, objects, couplings and forces of a record, in scene order; records must come in order."""
@@ -143,7 +147,8 @@ class Objects:
         if space is None:
             self._known = []
             return [*record.walls, *ports] if ports else record.walls
-        if len(self._known) != space.objects:
+        if len(self._known) != space.objects or self._listing != space.listing:
+            self._listing = space.listing
             self._known = [_UNTOUCHED] * space.objects
         for one in space.near:
             self._known[one.index] = one.contact
@@ -248,24 +253,24 @@ def input_map(record: TickRecord, timestamp: float, inputs: Inputs) -> Map:
 
 
 class Cycles:
-    """Sees from one record to the next which walls completed a cycle.
+    """Sees from one record to the next which walls and objects completed a cycle.
 
     A reload may put a wall in another one's place. So a cycle counts as seen when any wall had it in the record before,
-    number and figures the same to the last bit: each of those stands for one wall now.
+    number and figures the same to the last bit: each of those stands for one wall now. Of an object, which is not in
+    every record, any had it in the list of objects before.
     """
 
     def __init__(self) -> None:
         self._last: list[bytes] = []
-        self._of_objects: dict[int, int] = {}
+        self._of_objects: dict[int, bytes] = {}
+        self._of_lists_before: list[bytes] = []
+        self._listing = -1
 
     def completed(self, record: TickRecord) -> Iterator[tuple[int, int]]:
         """Contact and number of each cycle that ended in this record, walls before objects; records come in order."""
         if record.space is not None:
-            for one in record.space.near:
-                number = one.contact.cycle
-                if number > 0 and number != self._of_objects.get(one.index, 0):
-                    yield len(record.walls) + one.index, number
-                self._of_objects[one.index] = number
+            for index, number in self._completed_by_objects(record.space):
+                yield len(record.walls) + index, number
         before, self._last = self._last, [_cycle(wall) for wall in record.walls]
         if self._last == before:
             return
@@ -281,6 +286,21 @@ class Cycles:
                 left.remove(self._last[index])
             elif record.walls[index].cycle > 0:
                 yield index, record.walls[index].cycle
+
+    def _completed_by_objects(self, space: SpaceRecord) -> Iterator[tuple[int, int]]:
+        if space.listing != self._listing:
+            self._listing = space.listing
+            self._of_lists_before += self._of_objects.values()
+            self._of_objects = {}
+        for one in space.near:
+            number = one.contact.cycle
+            if number > 0:
+                cycle = _cycle(one.contact)
+                before, self._of_objects[one.index] = self._of_objects.get(one.index), cycle
+                if before is None and cycle in self._of_lists_before:
+                    self._of_lists_before.remove(cycle)
+                elif cycle != before:
+                    yield one.index, number
 
 
 def cycle_map(record: TickRecord, timestamp: float, contact: int) -> Map:

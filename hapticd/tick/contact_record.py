@@ -75,6 +75,7 @@ class SpaceRecord:
 
     Attributes:
         objects: how many the scene has.
+        listing: which list of objects that is; another one where any of them came, went or changed places.
         moved_j: work that changes of the objects did on their springs [J].
         friction_j: energy that slipping took, a part of what is dissipated [J].
         friction_energy_j: energy in the springs along surfaces now, a part of what is stored [J].
@@ -82,6 +83,7 @@ class SpaceRecord:
     """
 
     objects: int
+    listing: int
     moved_j: float
     friction_j: float
     friction_energy_j: float
@@ -93,6 +95,9 @@ CODES = {"int": "q", "bool": "q", "float": "d"}
 
 WALL = "".join(CODES[str(field.type)] for field in fields(WallRecord))
 SPACE = "qddd"
+LISTINGS = 65536
+"""What stands where the number of objects does: that number, and this times that of their list."""
+
 OBJECT = f"q{WALL}ddddddddddqqQ"
 """How `struct` writes what the records above have."""
 
@@ -170,4 +175,5 @@ def space_record(values: Sequence[Any]) -> SpaceRecord:
             )
         )
     objects, moved_j, friction_j, friction_energy_j = values[: len(SPACE)]
-    return SpaceRecord(objects, moved_j, friction_j, friction_energy_j, tuple(near))
+    listing, objects = divmod(objects, LISTINGS)
+    return SpaceRecord(objects, listing, moved_j, friction_j, friction_energy_j, tuple(near))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, cast
 
 from hapticd.tick.contact_record import (
     CODES,
+    LISTINGS,
     MOST_OBJECTS,
     OBJECT,
     SPACE,
@@ -268,7 +269,8 @@ class RecordLayout:
         struct = self._structs[walls]
         if tick.has_objects:
             scene = cast("SpaceTick", tick)
-            values += (scene.objects, books.moved_j - work_j, books.friction_j, books.friction_stored_j)
+            objects = scene.objects + LISTINGS * scene.listing
+            values += (objects, books.moved_j - work_j, books.friction_j, books.friction_stored_j)
             x, y, z = motion.position_m
             near = scene.awake if len(scene.awake) <= MOST_OBJECTS else sorted(scene.awake, key=untouched)
             shown = [each for each in near[:MOST_OBJECTS] if not each.leaving]

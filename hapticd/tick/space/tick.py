@@ -44,6 +44,7 @@ class SpaceTick(ControlTick):
     Attributes:
         solids: one a solid, in scene order.
         objects: how many objects the scene has.
+        listing: counted up whenever one of them comes, goes or changes places.
         awake: those that the device may touch, and those that are gone and whose force still fades out.
         books: of all objects together.
 
@@ -68,6 +69,7 @@ class SpaceTick(ControlTick):
         limits = _object_limits(scene)
         self.solids = [self._contact(solid, make_law, limits) for solid in compile_objects(scene.objects, period_s)]
         self.objects = len(scene.objects)
+        self.listing = 0
         self.awake: list[SolidContact] = []
         self.books = SpaceBooks()
         self._fading: list[SolidContact] = []
@@ -137,6 +139,7 @@ class SpaceTick(ControlTick):
         yield from super().switch(scene, safety, make_law)
         # From here on nothing can fail.
         limit_n = self.guard.limit_n
+        before = _places(self.solids)
         for contact, solid in kept:
             contact.solid.index, contact.solid.members = solid.index, solid.members
         for contact, still in fading:
@@ -151,6 +154,7 @@ class SpaceTick(ControlTick):
             contact.change(solid, channels, limit_n, self._at)
             blending += contact.channels
         self.solids = there
+        self.listing += _places(there) != before
         if scene is not None:
             self.objects = len(scene.objects)
             for each in self._moving():
@@ -343,6 +347,11 @@ class SpaceTick(ControlTick):
 
 def _object_limits(scene: SceneConfig) -> Limits:
     return {limits.name: limits for limits in port_limits(scene) if limits.kind == "object"}
+
+
+def _places(solids: Iterable[SolidContact]) -> list[tuple[object, ...]]:
+    """Who stands where in the list of objects."""
+    return [(contact.solid.name, contact.moves, contact.solid.members) for contact in solids]
 
 
 def _no_law() -> RunningLaw:
