@@ -102,7 +102,7 @@ class Recovery:
             self.stop()
 
     def stop(self) -> None:
-        """Stop looking."""
+        """Give up a try that is under way; the next turn begins another."""
         if self._start is not None:
             self._start.end()
             self._start = None

@@ -120,6 +120,8 @@ class Reload:
 
         self._under_way = True
         if state.recovery.lost:
+            if _meaning(wanted) != _meaning(state.config):
+                state.recovery.stop()  # a try that is under way has the file of before
             resume = state.recovery.resume
             other_law = not same_law(state.config, wanted)
             state.recovery.amend(replace(resume, law=resume.law + other_law))

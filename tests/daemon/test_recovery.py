@@ -10,19 +10,23 @@ from typing import Any
 
 import pytest
 
+from hapticd.config.loading import parse
 from hapticd.errors import DeviceNotFoundError
 from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED
 from hapticd.loop.resume import ResumeState
 from hapticd.simulation.options import SimulationOptions
 from hapticd.supervisor import recovery
 from hapticd.supervisor.recovery import Recovery
+from hapticd.supervisor.reload import Reload
 from hapticd_drivers.loopback import Loopback
+from tests.daemon.running import wait_until
 
 
 class UnderWay:
     """A start that takes its time."""
 
-    def __init__(self, _config: Any, resume: ResumeState) -> None:
+    def __init__(self, config: Any, resume: ResumeState) -> None:
+        self.config = config
         self.resume = resume
         self.ended = False
 
@@ -80,6 +84,37 @@ def test_clearing_again_and_again_keeps_no_device_away(looking: tuple[Recovery, 
         try_now(made)
     assert len(tries) == 2
     assert not tries[1].ended
+
+
+@pytest.mark.parametrize(("text", "tries_wanted"), [("[safety]\nmax_force_n = 2.0\n", 2), ("# a remark\n", 1)])
+def test_a_reload_reaches_the_try_that_is_under_way_by_another_one(
+    looking: tuple[Recovery, list[UnderWay]], tmp_path: Path, text: str, tries_wanted: int
+) -> None:
+    """Under way it has the file of before, and its limit of force, which the daemon would show as changed."""
+    made, tries = looking
+    file = tmp_path / "lab.toml"
+    file.write_text(text)
+    verdicts: list[str] = []
+    state: Any = SimpleNamespace(
+        config=parse("", str(file)),
+        recovery=made,
+        reload_asked=[verdicts.append],
+        notifier=SimpleNamespace(send=lambda *_: None),
+        tell=lambda *_: None,
+        adopt=lambda config, _ring: setattr(state, "config", config),
+    )
+    taking = Reload(state)
+
+    def answered() -> bool:
+        taking.turn()
+        return bool(verdicts)
+
+    wait_until(answered, "a verdict")
+    assert (verdicts, state.config.text) == ([""], text)
+    made.turn(LOST, state.config)
+    assert len(tries) == tries_wanted
+    assert [each.ended for each in tries] == [True, False][-tries_wanted:]
+    assert tries_wanted == 1 or tries[-1].config is state.config
 
 
 class Lost:
