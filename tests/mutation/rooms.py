@@ -45,6 +45,7 @@ class Room:
 
 def _law(name: str) -> Room:
     own = () if name == "none" else (f"tests/controllers/test_{name}.py",)
+    own += ("tests/controllers/test_cycle_sums.py",) if name in ("energy_cycle", "late_cycle") else ()
     select = f"{name} or {name.replace('_', '-')}"
     return Room((f"controllers/hapticd_controllers/{name}.py",), (*own, *LAW_TESTS), select)
 
@@ -121,8 +122,12 @@ ROOMS = {
     **{
         name: Room(
             (f"controllers/hapticd_controllers/{name}.py",),
-            (*(f"tests/controllers/test_{law}.py" for law in ("felt_mass", "late_cycle", "energy_cycle")), *LAW_TESTS),
-            "energy_cycle or energy-cycle or late_cycle or late-cycle or felt_mass",
+            (
+                *(f"tests/controllers/test_{law}.py" for law in ("cycle_sums", "felt_mass", "late_cycle")),
+                *LAW_TESTS,
+                "tests/controllers/test_energy_cycle.py",
+            ),
+            "cycle_sums or energy_cycle or energy-cycle or late_cycle or late-cycle or felt_mass",
         )
         for name in ("cycle_sums", "felt_mass")
     },

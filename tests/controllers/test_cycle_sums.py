@@ -1,0 +1,78 @@
+"""An energy cycle: two falls before its lowest energy, two rises after it, counted from where it begins."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from types import ModuleType
+
+import pytest
+
+from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
+from hapticd_controllers import energy_cycle, late_cycle
+from hapticd_controllers.cycle_sums import begin, end
+
+PUSH_N = 3.0
+LAWS = pytest.mark.parametrize("law", [energy_cycle, late_cycle], ids=["energy_cycle", "late_cycle"])
+
+
+class Contact:
+    """A law that is shown a contact of 3 N, pressed and released by so much at each sample; a rise takes energy."""
+
+    def __init__(self, law: ModuleType) -> None:
+        self.law = law
+        self.params = plain_object("Params", scalar_params(law.Params()))
+        self.state = fresh_state(law)
+        law.start(self.state, self.params, LawSnapshot(x_m=-5e-3))
+        self.tick = LawTick(x_m=-5e-3, in_contact=True, contact_n=PUSH_N)
+
+    def goes(self, *steps: int) -> list[float]:
+        """The damping after each step in or out, of 1 mm, under the force that is held since the last."""
+        found = []
+        for step in steps:
+            tick = self.tick
+            tick.applied_n = tick.applied_contact_n = PUSH_N
+            tick.moved_m = -1e-3 * step
+            tick.velocity_m_per_s = tick.moved_m / tick.dt_s
+            tick.x_m += tick.moved_m
+            self.law.step(self.state, self.params, tick)
+            found.append(float(self.state.damping_n_s_per_m))
+        return found
+
+
+@LAWS
+def test_one_fall_is_no_release_and_two_are_at_the_beginning_too(law: ModuleType) -> None:
+    assert set(Contact(law).goes(-1, 1, 1, 1)) == {0.0}
+    found = Contact(law).goes(-1, -1, 1, 1)
+    assert found[:3] == [0.0] * 3
+    assert found[3] == pytest.approx(PUSH_N), "6 mJ of generated energy in 2 ms at 1 m/s"
+
+
+@LAWS
+def test_a_rise_in_between_is_another_release(law: ModuleType) -> None:
+    assert set(Contact(law).goes(-1, 1, -1, 1, -1, 1, 1)) == {0.0}
+
+
+@LAWS
+def test_each_cycle_counts_from_where_the_one_before_has_ended(law: ModuleType) -> None:
+    """The second takes 6 mJ and gives back 3: it has generated nothing, and what it holds is not counted twice."""
+    contact = Contact(law)
+    contact.goes(-1, -1, 1, 1)
+    after = contact.goes(1, 1, -1, -1, 1, 1)
+    assert all(b <= a for a, b in pairwise(after))
+
+
+def test_what_is_owed_from_before_is_where_the_first_fall_begins() -> None:
+    state = fresh_state(energy_cycle)
+    begin(state, -2.5)
+    assert (state.energy_j, state.window_energy_j) == (-2.5, -2.5)
+    assert (state.window_falls, state.window_rises) == (0, 0)
+
+
+def test_at_the_end_energies_count_from_the_lowest_and_the_way_from_here() -> None:
+    state = fresh_state(energy_cycle)
+    begin(state, 0.0)
+    state.energy_j, state.window_energy_j, state.window_minimum_j = -1.0, -1.0, -3.0
+    state.candidate_stored_j = 0.25
+    end(state, -2e-3)
+    assert (state.energy_j, state.window_energy_j, state.stored_j) == (2.0, 2.0, 0.25)
+    assert (state.lowest_m, state.highest_m) == (-2e-3, -2e-3)
