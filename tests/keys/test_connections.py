@@ -147,6 +147,34 @@ def test_few_descriptors_are_said_when_no_more_can_be_had(monkeypatch: pytest.Mo
     assert connections.raise_descriptor_limit() == ""
 
 
+LIMITS = """
+import resource, sys
+from hapticd.keys.connections import raise_descriptor_limit
+for soft, hard in eval(sys.argv[1]):
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    said = raise_descriptor_limit()
+    print(*resource.getrlimit(resource.RLIMIT_NOFILE), said.partition(";")[0], sep="|")
+"""
+"""What becomes of a process with such limits; a hard one only ever falls."""
+
+
+@pytest.mark.skipif(resource.getrlimit(resource.RLIMIT_NOFILE)[1] < DESCRIPTORS + 1, reason="too few may be had here")
+def test_a_process_gets_as_many_descriptors_as_are_enough_and_no_more() -> None:
+    most = DESCRIPTORS
+    limits = [(most + 1, most + 1), (1000, most + 1), (most, most), (most - 1, most), (500, 4000), (300, 300)]
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITS, repr(limits)], check=True, timeout=60.0, text=True, stdout=subprocess.PIPE
+    )
+    assert done.stdout.splitlines() == [
+        f"{most + 1}|{most + 1}|",
+        f"{most}|{most + 1}|",
+        f"{most}|{most}|",
+        f"{most}|{most}|",
+        f"4000|4000|only 4000 file descriptors, of {most}: a flood of connections could end the daemon",
+        f"300|300|only 300 file descriptors, of {most}: a flood of connections could end the daemon",
+    ]
+
+
 def ended(connection: sockets.socket) -> bool:
     """Whether the other side has closed it; the greeting that ZeroMQ sends first is passed over."""
     connection.setblocking(False)
