@@ -131,6 +131,17 @@ def test_whatever_a_file_holds_it_is_a_key_or_an_error_that_names_it(
         assert not key.secret or zmq.curve_public(key.secret.encode()).decode() == key.public
 
 
+@pytest.mark.parametrize("text", ["", "0" * 39, "0" * 41, "#" * 40, "é" * 40, "'" * 40, " " * 40, "0" * 35 + "\n" * 5])
+def test_what_is_not_forty_characters_of_z85_is_no_key(text: str, tmp_path: Path) -> None:
+    """Five number signs are more than 32 bits."""
+    assert not is_key(text)
+    path = tmp_path / "a.key"
+    path.write_text(f'curve\n    public-key = "{text.splitlines()[0] if text else text}"\n')
+    with pytest.raises(ConfigError):
+        read(path)
+    assert is_key("0" * 40)
+
+
 def test_what_is_no_file_is_named_and_never_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.key")
     for path, why in (
