@@ -141,7 +141,7 @@ def test_a_connection_within_this_computer_is_known_by_its_path(tmp_path: Path) 
             assert has_ended(client)
 
 
-def test_who_is_not_known_is_neither_heard_nor_ended() -> None:
+def test_who_is_not_known_is_neither_heard_nor_ended_and_who_is_is_ended_once() -> None:
     with bound_of(3, keep_heard=True) as bound, listening() as (taken, client, endpoint):
         bound._endpoints = {endpoint: {taken.fileno(): _Client()}}
         bound.heard(taken.fileno() + 1)
@@ -151,4 +151,6 @@ def test_who_is_not_known_is_neither_heard_nor_ended() -> None:
         assert before_s <= bound._endpoints[endpoint][taken.fileno()].heard_s <= time.monotonic()
         assert not any(bound.odd(taken.fileno() + 1) for _ in range(2 * connections.MOST_ODD))
         assert not has_ended(client)
-        bound._endpoints = {}
+        said = [bound.odd(taken.fileno()) for _ in range(connections.MOST_ODD + 3)]
+        assert said == [False] * connections.MOST_ODD + [True, False, False], "it is not known any more"
+        assert has_ended(client)
