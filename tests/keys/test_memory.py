@@ -8,6 +8,8 @@ from hapticd.keys import memory
 from hapticd.keys.memory import Culprits, MemoryBound, resident_bytes
 
 BOUND = 100
+FURTHER_BYTES = 64 << 20
+"""By which the bound rises where it is not clients who have the memory."""
 
 
 @pytest.fixture
@@ -43,9 +45,9 @@ def test_for_a_second_those_that_send_are_ended_then_all_and_then_the_bound_is_f
     held.append(BOUND + 1)
     asked = [bound.turn(0.25 * look) for look in range(13)]
     assert asked == [Culprits.SENDERS] * 4 + [Culprits.ALL] + [Culprits.NO_ONE] * 8
-    held.append(BOUND + 1 + memory._FURTHER_BYTES)
+    held.append(BOUND + 1 + FURTHER_BYTES)
     assert bound.turn(10.0) is Culprits.NO_ONE
-    held.append(BOUND + 2 + memory._FURTHER_BYTES)
+    held.append(BOUND + 2 + FURTHER_BYTES)
     assert bound.turn(11.0) is Culprits.SENDERS
 
 
