@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -18,9 +19,9 @@ LAWS = pytest.mark.parametrize("law", [energy_cycle, late_cycle], ids=["energy_c
 class Contact:
     """A law that is shown a contact of 3 N, pressed and released by so much at each sample; a rise takes energy."""
 
-    def __init__(self, law: ModuleType) -> None:
+    def __init__(self, law: ModuleType, **params: Any) -> None:
         self.law = law
-        self.params = plain_object("Params", scalar_params(law.Params()))
+        self.params = plain_object("Params", scalar_params(law.Params(**params)))
         self.state = fresh_state(law)
         law.start(self.state, self.params, LawSnapshot(x_m=-5e-3))
         self.tick = LawTick(x_m=-5e-3, in_contact=True, contact_n=PUSH_N)
@@ -76,3 +77,16 @@ def test_at_the_end_energies_count_from_the_lowest_and_the_way_from_here() -> No
     end(state, -2e-3)
     assert (state.energy_j, state.window_energy_j, state.stored_j) == (2.0, 2.0, 0.25)
     assert (state.lowest_m, state.highest_m) == (-2e-3, -2e-3)
+
+
+@pytest.mark.parametrize(("future", "ends"), [(0, 2), (1, 1), (2, 2), (3, 3)])
+def test_as_many_rises_end_a_cycle_as_are_asked_for_and_two_where_none_are(future: int, ends: int) -> None:
+    found = Contact(energy_cycle, window_future=future).goes(-1, -1, 1, 1, 1, 1)
+    assert [damping > 0.0 for damping in found] == [False] * (1 + ends) + [True] * (5 - ends)
+
+
+@pytest.mark.parametrize(("rule", "expected"), [("signed", -9.0 / 7.0), ("non-negative", 0.0), ("non-decreasing", 0.0)])
+def test_what_a_cycle_has_taken_makes_the_damping_negative_nothing_or_what_it_was(rule: str, expected: float) -> None:
+    """15 mJ in, 6 out again: 9 mJ more than it generated, in 7 ms at 1 m/s."""
+    contact = Contact(energy_cycle, rule=rule, cap="none")
+    assert contact.goes(1, 1, 1, 1, 1, -1, -1, 1, 1)[-1] == pytest.approx(expected)

@@ -30,6 +30,7 @@ TOGETHER = {
         'work = "total"\npairing = "power"\nrule = "signed"\ncap = "fixed"\n',
         "small_travel_counts = 9000.0\nsmall_leaks = 0.5\n",
         "min_travel_counts = 2000.0\n",
+        "window_future = 1\n",
     ],
 }
 """Modes that show only beside others."""

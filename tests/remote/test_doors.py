@@ -24,8 +24,8 @@ from hapticd.remote.scene_socket import SceneSocket
 from hapticd.remote.state_socket import StateSocket
 from hapticd.tick.record import RecordLayout
 from tests.keys.endpoints import Client, ring_of
+from tests.ports import free_port
 from tests.remote.heard import TOOL, HeardPort
-from tests.remote.test_life import free_port
 
 PATIENCE_S = 20.0
 SERVER = new_pair()
