@@ -91,9 +91,12 @@ class Browser:
         page.resize(width, height)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         page.call("Emulation.setEmulatedMedia", features=[scheme])
-        page.call("Page.navigate", url=url)
-        page.wait_for("document.readyState === 'complete'")
+        page.load("Page.navigate", url=url)
         return page
+
+    def hear(self) -> None:
+        """Wait for the next event; no command is under way."""
+        self.heard.append(json.loads(self.socket.recv(PATIENCE_S)))
 
 
 class Page:
@@ -112,6 +115,13 @@ class Page:
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
         return self.browser.call(method, self.session, **params)
+
+    def load(self, method: str, **params: Any) -> None:
+        """Have the browser load a page; returns when the new one is there, of which the one before knows nothing."""
+        loaded = len(self.events("Page.loadEventFired"))
+        self.call(method, **params)
+        while len(self._told("Page.loadEventFired")) == loaded:
+            self.browser.hear()
 
     def evaluate(self, expression: str) -> Any:
         """The value of an expression, awaited when it is a promise."""
@@ -167,6 +177,9 @@ class Page:
     def events(self, method: str) -> list[dict[str, Any]]:
         """What the browser has told of this tab under a name so far."""
         self.evaluate("0")  # what was on its way is heard before the answer
+        return self._told(method)
+
+    def _told(self, method: str) -> list[dict[str, Any]]:
         return [
             heard["params"]
             for heard in self.browser.heard

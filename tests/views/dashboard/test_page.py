@@ -94,14 +94,14 @@ def test_every_request_is_to_the_page_s_own_address_and_nothing_is_complained_of
 
 def test_the_token_is_out_of_sight_and_outlives_a_reload(page: Page, served: Served) -> None:
     assert served.token not in page.evaluate("location.href")
-    page.call("Page.reload")
+    page.load("Page.reload")
     page.wait_inside("page.store.ring.end > 100")
     assert page.evaluate("document.getElementById('disarm').disabled") is False
 
 
 def test_a_reload_begins_with_the_past(page: Page) -> None:
     seen = page.inside("page.store.ring.latest")
-    page.call("Page.reload")
+    page.load("Page.reload")
     page.wait_inside("page.store.ring.end > 100")
     assert page.inside("page.store.ring.time(page.store.ring.begin)") < seen
 
@@ -284,8 +284,7 @@ def test_it_is_dark_where_the_system_is_and_where_it_is_told_to_be(browser: Brow
             assert bool(page.picture()[700:, 5].mean() < 60) is dark
             page.click("#theme")
             assert bool(page.picture()[700:, 5].mean() < 60) is not dark
-            page.call("Page.reload")
-            page.wait_for("document.readyState === 'complete'")
+            page.load("Page.reload")
             assert bool(page.picture()[700:, 5].mean() < 60) is not dark
 
 
