@@ -115,9 +115,11 @@ class Session:
         words[LATCHED] = tick.guard.latched
 
     def latch(self) -> None:
-        """Have the device stay disarmed until the fault that ended the loop is cleared."""
+        """Have the device stay disarmed until the fault that ended the loop is cleared, and somebody arms it."""
         self.tick.guard.latched = True
-        self.shared.words[LATCHED] = True
+        words = self.shared.words
+        words[LATCHED] = True
+        words[MAY_ARM] = False
 
     def enable_or_tell(self) -> None:
         """Arm, where that needs no one's word; a device that refuses stays disarmed and says why."""
