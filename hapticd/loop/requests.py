@@ -198,7 +198,7 @@ class RequestHandler:
         """Do what takes long beside the loop.
 
         Raises:
-            HapticdError: what the work raised.
+            Exception: what the work raised.
         """
         ended: list[Exception | None] = []
 
@@ -206,7 +206,7 @@ class RequestHandler:
             try:
                 work()
                 ended.append(None)
-            except HapticdError as error:
+            except Exception as error:  # noqa: BLE001 - without an end of this one no other request would be begun
                 ended.append(error)
 
         before_s = sys.getswitchinterval()

@@ -21,6 +21,7 @@ from hapticd.loop import requests
 from hapticd.supervisor.reload import switch_request
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
+from tests.daemon.running import wait_until
 from tests.loop.bench import PERIOD_S, Bench
 
 WALLS = "[[scene.walls]]\nstiffness_n_per_m = 12000.0\n"
@@ -249,6 +250,27 @@ def test_a_law_that_cannot_be_imported_is_an_answer(bench: Bench) -> None:
     request = switch_request(START, configured(WALLS)) | {"law": "tests.no_such_law", "keep_law": False}
     assert "tests.no_such_law" in bench.ask(**request)
     assert bench.tick.contacts[0].law.module.__name__ == "hapticd_controllers.ring_damping"
+    assert bench.ask(do="arm") == ""
+
+
+def test_a_law_whose_import_fails_in_an_unknown_way_is_an_answer_too(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was waited for without an end, and all that was asked for later behind it."""
+
+    def broken(_name: str) -> ModuleType:
+        raise MemoryError("no room")
+
+    request = switch_request(START, configured(WALLS)) | {"law": "lab.law", "keep_law": False}
+    monkeypatch.setattr(plugins, "law", broken)
+    bench.shared.post(request)
+
+    def answered() -> bool:
+        bench.loop.requests.work()
+        return bench.answered
+
+    wait_until(answered, "a verdict")
+    assert bench.shared.verdict() == "MemoryError: no room"
     assert bench.ask(do="arm") == ""
 
 
