@@ -116,6 +116,7 @@ class ControlTick:
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         self._blind = True
         self._excused = False
+        self._calibrated = True
         self._blind_gain = 0.0
         self._blind_from_n = [0.0] * axes
         self.motion.watch_speed(guard.max_speed_m_per_s < math.inf)
@@ -147,6 +148,7 @@ class ControlTick:
             PluginError: the law cannot start.
         """
         self._blind = not self.motion.start(sample)
+        self._calibrated = sample.calibrated
         self._excused = not sample.calibrated
         if self._blind and sample.calibrated:
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
@@ -176,7 +178,7 @@ class ControlTick:
 
     def tare(self) -> bool:
         """Count positions from here on. False while forces are let through or it is not known where the device is."""
-        if self._blind or self.guard.mode is not Mode.DISARMED:
+        if self._blind or not self._calibrated or self.guard.mode is not Mode.DISARMED:
             return False
         motion = self.motion
         self._move_origin([origin + at for origin, at in zip(motion.origin_m, motion.position_m, strict=True)])
@@ -325,6 +327,8 @@ class ControlTick:
                     self.fail(EventCode.DEVICE_FROZEN, f"the device had nothing new for {silent_ms:.3g} ms")
             elif seen and motion.watches_speed:
                 self._check_speed()
+        else:
+            self._calibrated = sample.calibrated
         if not seen or self._blind:
             if not seen or self._blind_gain > 0.0:
                 return self._step_blind(sample.calibrated, passed_s)

@@ -75,6 +75,22 @@ def test_tare_is_refused_with_a_force_or_without_a_position_and_moves_nothing(
     assert bench.tick.motion.origin_m == [0.0]
 
 
+@pytest.mark.parametrize("ever", [False, True])
+def test_a_device_that_is_not_calibrated_is_not_tared(bench: Bench, ever: bool) -> None:
+    """One that is calibrated by hand would count from where it had only seemed to be."""
+    sample = bench.driver.read()
+    sample.calibrated = False
+    if ever:
+        bench.ticks(1)
+    else:
+        bench.tick.start(sample)
+    assert "must know where it is" in bench.ask(do="tare")
+    assert bench.tick.motion.origin_m == [0.0]
+    sample.calibrated = True
+    bench.ticks(1)
+    assert bench.ask(do="tare") == ""
+
+
 def test_a_tared_scene_is_kept_through_a_switch_and_felt_where_it_is(bench: Bench) -> None:
     bench.ticks(1)
     bench.ask(do="tare")

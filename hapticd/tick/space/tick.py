@@ -202,6 +202,8 @@ class SpaceTick(ControlTick):
                     self.fail(EventCode.DEVICE_FROZEN, f"the device had nothing new for {silent_ms:.3g} ms")
             elif seen and motion.watches_speed:
                 self._check_speed()
+        else:
+            self._calibrated = sample.calibrated
         if not seen or self._blind:
             if not seen or self._blind_gain > 0.0:
                 return self._step_blind(sample.calibrated, passed_s)
