@@ -91,11 +91,24 @@ def test_couplings_and_forces_stand_behind_walls_and_objects_under_their_names()
     text = "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
     assert text.count("wall 0") == 1
     assert "wall 1" not in text
-    assert "client's tool  ● held     pushes  0.50 N -z+x  message 42  damping    3.5 N s/m" in text
-    assert "client's field  ○ let go   damping    0.0 N s/m" in text
+    assert "client's tool  ● held     pushes  0.50 N -z+x  damping   3.5 N s/m  message 42" in text
+    assert "client's field  ○ let go   damping   0.0 N s/m" in text
     assert text.count("pushes") == 2
     assert "damping 20.5 N s/m  sliding  message 17" in text
     assert "tool held 0.50 N damping 3.5 N s/m" in one_line(known)
     assert "field let go damping 0.0 N s/m" in one_line(known)
     known.take([Touch(1.0, 100, (0.1, 0.0, 0.0), remote=1)], 0.0)
-    assert "0.10 N +x  fades out" in "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+    assert "0.10 N +x  damping   3.5 N s/m  fades out" in "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+
+
+def test_eighty_columns_cut_no_line_of_what_is_touched_or_driven() -> None:
+    known = touched()
+    kinds = ("object", "coupling")
+    known.take([dataclasses.replace(STATUS, remote_name=("ball", "tool"), remote_kind=kinds)], 0.0)
+    known.take([Damping(1.0, 99, (7.5, 120.5, 0.0, 150.5), (True, True, False, True), (0.25,) * 4)], 0.0)
+    ball = Touch(1.0, 100, (6.0, 5.9, 5.8), 0, (0.0, 0.0, 0.03), (0.0, 0.0, 1.0), 2e-4, True, 0, (0,), 0, 123456)
+    known.take([ball, Touch(1.0, 100, (6.0, 5.9, -5.8), remote=1, remote_seq=123456, target_m=(0.0,) * 3)], 0.0)
+    lines = [line.plain.rstrip() for line in frame(known, "ipc://here", 80, 40, 0.0)]
+    assert " tool  ● held     pushes 10.22 N +x+y-z  damping 150.5 N s/m  message 123456" in lines
+    assert " ● ball   0.200 mm deep  pushes 10.22 N +x+y+z  damping 120.5 N s/m  sliding" in lines
+    assert not [line for line in lines if "…" in line]

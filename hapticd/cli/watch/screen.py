@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import textwrap
 import time
 from collections.abc import Sequence
@@ -88,7 +89,8 @@ def one_line(known: ScreenState) -> str:
         parts += [f"damping {damping:.1f} N s/m" for damping in known.damping.damping_n_s_per_m[:walls]]
         parts += port_words(known.pushes, known.damping, status)
     if status.object_name:
-        parts += [line.plain.strip() for line in contact_lines(known.trail, status, of_objects(known.damping, status))]
+        touched = contact_lines(known.trail, status, of_objects(known.damping, status), sys.maxsize)
+        parts += [line.plain.strip() for line in touched]
     if known.energy:
         parts += [f"energy {si(known.energy.energy_j, 'J')}", f"generated {si(known.energy.generated_j, 'J')}"]
     return "  ".join(parts)
@@ -109,7 +111,7 @@ def _running(known: ScreenState, status: Status, endpoint: str, width: int, heig
     above += _model(status, width)
     middle = [
         *_walls(known, status, width),
-        *contact_lines(known.trail, status, of_objects(known.damping, status)),
+        *contact_lines(known.trail, status, of_objects(known.damping, status), width),
         _energy(known, width),
     ]
     footer = _footer(status, endpoint, width)
@@ -306,7 +308,7 @@ def _walls(known: ScreenState, status: Status, width: int) -> list[Text]:
         lines.append(line)
     if count > _MOST_WALLS:
         lines[-1] = _spread(lines[-1], Text(f"+{count - _MOST_WALLS} walls ", style=_QUIET), width)
-    return [*lines, *port_lines(known.pushes, known.damping, status)]
+    return [*lines, *port_lines(known.pushes, known.damping, status, width)]
 
 
 def _energy(known: ScreenState, width: int) -> Text:

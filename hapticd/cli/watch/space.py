@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 
 from rich.text import Text
 
+from hapticd.cli.watch.line import fitting
 from hapticd.client import Status, Touch
 
 VIEW_ROWS = 9
@@ -53,13 +54,14 @@ class Trail:
         self.touches.append(touch)
 
 
-def contact_lines(trail: Trail, status: Status, dampings: Sequence[float]) -> list[Text]:
-    """A line for each object that is touched, or one that says that none is.
+def contact_lines(trail: Trail, status: Status, dampings: Sequence[float], width: int) -> list[Text]:
+    """A line for each object that is touched, or one that says that none is; the message goes where room is short.
 
     Args:
         trail: where the device was, and what it touches.
         status: names of the objects.
         dampings: of the law on each object [N s/m].
+        width: characters of a line.
     """
     if not status.object_name:
         return []
@@ -70,14 +72,9 @@ def contact_lines(trail: Trail, status: Status, dampings: Sequence[float]) -> li
     for touch in trail.touches[:MOST_LINES]:
         at = touch.object if touch.carrier < 0 else touch.carrier
         name = status.object_name[at] if at < len(status.object_name) else str(at)
-        newton = math.sqrt(sum(value * value for value in touch.force_n))
-        line = Text(" ● ", style="bold cyan").append(f"{name:<12}", "bold")
-        line.append(f" {1e3 * touch.depth_m:7.3f} mm deep", "default").append("  pushes ", _QUIET)
-        line.append(f"{newton:5.2f} N", "bold").append(f" {direction(touch.force_n)}", "default")
-        if touch.object < len(dampings):
-            line.append("  damping ", _QUIET).append(f"{dampings[touch.object]:.1f}").append(" N s/m", _QUIET)
-        line.append("  sliding" if touch.sliding else "", "yellow")
-        lines.append(line.append(f"  message {touch.remote_seq}" if touch.remote_seq >= 0 else "", _QUIET))
+        message = f"  message {touch.remote_seq}" if touch.remote_seq >= 0 else ""
+        choices = ((f"{name:<12}", message), (name, message), (name, ""))
+        lines.append(fitting((_touched(first, touch, dampings, last) for first, last in choices), width))
     return lines
 
 
@@ -140,6 +137,16 @@ def views(trail: Trail, width: int) -> list[tuple[str, str, list[Text]]]:
         ("from above", "x → y ↑", view(trail, 0, 1, half - 4, VIEW_ROWS)),
         ("from the side", "x → z ↑", view(trail, 0, 2, width - half - 4, VIEW_ROWS)),
     ]
+
+
+def _touched(name: str, touch: Touch, dampings: Sequence[float], message: str) -> Text:
+    newton = math.sqrt(sum(value * value for value in touch.force_n))
+    line = Text(" ● ", style="bold cyan").append(name, "bold")
+    line.append(f" {1e3 * touch.depth_m:7.3f} mm deep", "default").append("  pushes ", _QUIET)
+    line.append(f"{newton:5.2f} N", "bold").append(f" {direction(touch.force_n)}", "default")
+    if touch.object < len(dampings):
+        line.append("  damping ", _QUIET).append(f"{dampings[touch.object]:.1f}").append(" N s/m", _QUIET)
+    return line.append("  sliding" if touch.sliding else "", "yellow").append(message, _QUIET)
 
 
 def _columns(points: Iterable[Point], axes: Sequence[int]) -> list[list[float]]:
