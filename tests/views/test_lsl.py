@@ -264,6 +264,18 @@ def test_an_event_before_the_first_tick_is_kept_until_there_is_a_stream(kept: li
     assert ended_s == pytest.approx(0.5, abs=1e-6)
 
 
+@pytest.mark.parametrize(("ticks_s", "told_s"), [(-3600.0, 0.0), (3600.0, 3600.0), (None, 3600.0), (0.0, 0.0)])
+def test_a_text_is_of_now_whatever_the_clock_did(kept: list[Kept], ticks_s: float | None, told_s: float) -> None:
+    """A clock set ahead, told before a tick shows it; one set back, which no daemon follows, after and before a tick."""
+    bridge = Bridge()
+    now_s, today_s = time.monotonic(), time.time()
+    if ticks_s is not None:
+        bridge.take([*tick(1)[:3], Timing(today_s + ticks_s, 1, round(now_s * 1e9), 10.0, 5.0, 1e-3)], STATUS)
+    bridge.take([Event(today_s + told_s, 2, EventCode.MARKED, "go", {}), *tick(3)], STATUS)
+    ((_, at_s),) = kept[0].texts
+    assert at_s == pytest.approx(now_s, abs=1.0)
+
+
 def test_a_daemon_that_does_not_run_is_said(tmp_path: Path) -> None:
     environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(tmp_path)}
     done = subprocess.run([HAPTICD, "lsl"], env=environment, capture_output=True, text=True, check=False)

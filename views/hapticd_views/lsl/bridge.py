@@ -70,14 +70,24 @@ class Bridge:
                 case Cycle():
                     wall = {"wall": record.contact, "cycle": record.cycle, "generated_j": record.generated_j}
                     told = {"kind": "cycle", "seq": record.seq, **wall, "damping_n_s_per_m": record.damping_n_s_per_m}
-                    self._tell(told, record.timestamp - self._epoch_s)
+                    self._tell(told, self._local_s(record.timestamp))
                 case Event():
                     kind = "marker" if record.code == EventCode.MARKED else "event"
                     told = {"kind": kind, "seq": record.seq, "code": record.code, "text": record.text}
-                    self._tell(told, record.timestamp - self._epoch_s)
+                    self._tell(told, self._local_s(record.timestamp))
                 case _:
                     pass
         self._push(whole, status)
+
+    def _local_s(self, timestamp: float) -> float:
+        """When that was on LSL's clock, which is CLOCK_MONOTONIC.
+
+        The daemon's timestamps go ahead when the time of day was set or the computer slept, and what is told then may
+        come before the tick that shows it, or without any while the device is gone. What seems to lie ahead is of now.
+        """
+        now_s = time.monotonic()
+        local_s = timestamp - self._epoch_s
+        return local_s if local_s <= now_s else min(now_s, timestamp - (time.time() - now_s))
 
     def _joined(self, record: Position | Energy | Damping | Timing) -> JoinedTick | None:
         """The tick that this message completes."""
