@@ -12,6 +12,7 @@ from typing import Final
 
 import typer
 
+from hapticd.cli.group import Overview
 from hapticd.version import __version__
 
 COMMANDS: Final = {
@@ -31,6 +32,7 @@ COMMANDS: Final = {
     "clear": ("remote", "Clear the fault that stopped a running daemon."),
     "mark": ("remote", "Put a marker into a running daemon's event stream."),
     "reload": ("remote", "Let a running daemon take its edited file over."),
+    "stop": ("remote", "Ramp the force of a running daemon to zero and end it."),
     "switch": ("switch", "Put another law into the file, and into force."),
     "fault": ("fault", "List, show or export the records of faults."),
     "keys": ("keys", "Say who may reach this computer's daemons from another one."),
@@ -56,6 +58,8 @@ def application(wanted: str | None = None) -> typer.Typer:
     """
     app = typer.Typer(
         name="hapticd",
+        cls=Overview,
+        context_settings={"help_option_names": ["-h", "--help"]},  # of every command below as well
         help="Run a haptic device: a 1 ms control loop with a stabilising law, and its measurements over ZeroMQ.",
         epilog="Example: hapticd run --config lab.toml",
         add_completion=False,

@@ -8,11 +8,13 @@ from typing import Annotated
 
 import typer
 
+from hapticd.cli.group import Overview
 from hapticd.config.effective import effective_toml
 from hapticd.config.loading import load
 from hapticd.config.schema import json_schema
 
 app = typer.Typer(
+    cls=Overview,
     help="Describe the configuration file, or show one in full.",
     epilog="Example: hapticd config show /etc/hapticd/hapticd.toml",
     rich_markup_mode=None,

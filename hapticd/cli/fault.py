@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from hapticd.cli.group import Overview
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, Trace, plot
 from hapticd.errors import HapticdError
 from hapticd.faults.export import write_csv
@@ -21,6 +22,7 @@ from hapticd.faults.store import FaultStore
 from hapticd.paths import DEFAULT_INSTANCE, fault_directories
 
 app = typer.Typer(
+    cls=Overview,
     help="List, show or export the records of faults.",
     epilog="Example: hapticd fault show",
     rich_markup_mode=None,

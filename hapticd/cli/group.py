@@ -1,13 +1,25 @@
-"""A group of commands that imports only the one that is going to run; for command groups of any distribution."""
+"""Groups of commands: their help, and one that imports only what is going to run; for any distribution."""
 
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Mapping
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
+
+
+class Overview(TyperGroup):
+    """A group whose help has of each command the whole first sentence, in as many lines as that takes."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a name and a sentence for each command."""
+        listed = ((name, self.get_command(ctx, name)) for name in self.list_commands(ctx))
+        rows = [(name, one.get_short_help_str(sys.maxsize)) for name, one in listed if one and not one.hidden]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
 
 def lazy_group(commands: Mapping[str, tuple[str, str]], **settings: Any) -> typer.Typer:
@@ -18,7 +30,7 @@ def lazy_group(commands: Mapping[str, tuple[str, str]], **settings: Any) -> type
         settings: of the `typer.Typer`, such as `help` and `epilog`.
     """
 
-    class Group(TyperGroup):
+    class Group(Overview):
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             name, listed, rest = super().resolve_command(ctx, args)
             if name is None or listed is None:

@@ -10,11 +10,13 @@ from typing import Annotated
 
 import typer
 
+from hapticd.cli.group import Overview
 from hapticd.errors import ConfigError
 from hapticd.keys.file import Key, is_key, new_pair, read, write, written
 from hapticd.keys.store import SECRET, KeyDirectory, key_directory
 
 app = typer.Typer(
+    cls=Overview,
     help="Say who may reach this computer's daemons from another one.",
     epilog="Example: hapticd keys",
     rich_markup_mode=None,

@@ -1,4 +1,4 @@
-"""Requests to a running daemon: `hapticd arm`, `disarm`, `calibrate`, `tare`, `clear`, `mark`, `reload`.
+"""Requests to a running daemon: `hapticd arm`, `disarm`, `calibrate`, `tare`, `clear`, `stop`, `mark`, `reload`.
 
 Also the options that say which daemon: one of this computer by its name, or another computer's by its endpoint.
 """
@@ -14,7 +14,10 @@ import typer
 from hapticd.cli.completion import instances
 from hapticd.client import commands
 from hapticd.client.commands import command
-from hapticd.paths import DEFAULT_INSTANCE
+from hapticd.errors import InstanceError
+from hapticd.paths import CONTROL, DEFAULT_INSTANCE, alive, locate
+
+_ENDED_S = 15.0  # a ramp, and a driver that takes its time to let go of a device
 
 Instance = Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.", autocompletion=instances)]
 Connect = Annotated[
@@ -82,6 +85,26 @@ def tare(
     Example: hapticd tare
     """
     command("tare", instance, connect=connect, keys=keys)
+
+
+def stop(
+    instance: Instance = DEFAULT_INSTANCE,
+    connect: Connect = None,
+    keys: Keys = None,
+) -> None:
+    """Ramp the force of a running daemon to zero and end it.
+
+    Returns when a daemon of this computer has ended. A service stays off until it is started again.
+
+    Example: hapticd stop --instance left
+    """
+    place = None if connect else locate(CONTROL, instance).parent
+    command("stop", instance, connect=connect, keys=keys)
+    due_s = time.monotonic() + _ENDED_S
+    while place is not None and alive(place):
+        if time.monotonic() > due_s:
+            raise InstanceError(f"{instance}: has not ended after {_ENDED_S:.0f} s; its log says what holds it up")
+        time.sleep(0.02)
 
 
 def mark(

@@ -9,10 +9,12 @@ from typing import Annotated
 
 import typer
 
+from hapticd.cli.group import Overview
 from hapticd.cli.manual import shared_files
 from hapticd.service.install import METRICS_UNIT, PACKAGE, Installation, systemd_runs, unit_states
 
 app = typer.Typer(
+    cls=Overview,
     help="Install the daemon as a service, look at it, remove it.",
     epilog="Example: hapticd service install",
     rich_markup_mode=None,

@@ -70,7 +70,7 @@ def simulate(
     force is identified with the device model and closes the loop anew; its motion shows what a law answers to it, and
     not what would have come of it. The output then has a column for each law, or as .png, .svg or .pdf is one figure.
 
-    Example: hapticd simulate --config config/fig6-set1.toml --duration 3 --output run.csv
+    Example: hapticd simulate -c config/fig6-set1.toml -d 3 -o run.csv
     """
     if replay is not None:
         _replay(replay, config, duration, law or [], hand, output, overwrite, as_json)

@@ -60,13 +60,14 @@ def _lines(one: Mapping[str, Any]) -> list[str]:
     mode = "stopped by a fault" if status["latched"] else "armed" if status["armed"] else "disarmed"
     if status["device_lost_timestamp"]:
         mode = "no device"
+    rate_hz = status["measured_rate_hz"]
     parts = (
         mode,
         f"law {status['law']}" + (" (failed, damping instead)" if status["fallback"] else ""),
-        f"{status['measured_rate_hz']:.0f} of {status['rate_hz']:g} Hz",
+        f"{f'{rate_hz:.0f}' if rate_hz else '?'} of {status['rate_hz']:g} Hz",
         f"{100.0 * one['late_share']:.2g} % late",
         f"since {_shown(status['started_timestamp'])}",
-        status["device"] + (" (simulated)" if status["simulated"] else ""),
+        status["device"] + (", simulated" if status["simulated"] else ""),
     )
     lines = [f"{one['name']}: {', '.join(parts)}"]
     if status["fault_code"]:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ import typer
 
 from hapticd import __version__
 from hapticd.cli import main
-from hapticd.cli.app import COMMANDS, application
+from hapticd.cli.app import COMMANDS, GROUP, application
 from hapticd.errors import DeviceNotFoundError
 from hapticd.paths import directory
 
@@ -44,6 +45,9 @@ def test_version_and_help_are_answers() -> None:
     assert hapticd("--version").stdout == f"hapticd {__version__}\n"
     done = hapticd("--help")
     assert done.returncode == 0
+    assert hapticd("-h").stdout == done.stdout
+    assert "..." not in done.stdout.partition("Commands:")[2], "what a command does is said in full"
+    assert hapticd("fault", "list", "-h").stdout == hapticd("fault", "list", "--help").stdout
     assert all(summary in done.stdout for _, summary in COMMANDS.values())
     assert "Put laws to the test" in done.stdout, "commands of the entry-point group are listed"
 
@@ -89,7 +93,7 @@ def commands_of(app: typer.Typer, *path: str) -> list[tuple[str, ...]]:
     return [(*path, name) for name in names] + inner
 
 
-@pytest.mark.parametrize("name", [*COMMANDS, "study", "bench"])
+@pytest.mark.parametrize("name", [*COMMANDS, *sorted(entry_points(group=GROUP).names)])
 def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     paths = [path for path in commands_of(application(name)) if path[0] == name]
     assert paths
@@ -98,7 +102,10 @@ def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest
             main([*path, "--help"])
         shown = capsys.readouterr().out
         assert ended.value.code == 0
-        assert f"Example: hapticd {' '.join(path)}" in shown
+        examples = [part.strip() for part in shown.split("\n\n") if part.startswith("  Example: ")]
+        assert f"Example: hapticd {' '.join(path)}" in examples[0]
+        assert not [example for example in examples if "\n" in example], "it is copied into a shell as one line"
+        assert "..." not in shown.partition("Commands:")[2]
         if len(path) == 1 and name in COMMANDS:
             assert COMMANDS[name][1] in shown, "the overview and the command say different things"
 

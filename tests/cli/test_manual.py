@@ -67,10 +67,10 @@ def test_it_says_what_the_help_says(page: Path, command: str) -> None:
     assert len(paragraphs) > 2
     for paragraph in paragraphs:
         assert paragraph in text
-    names = re.findall(r"^  (-\S+(?:, --\S+)?)", options, re.MULTILINE)
+    names = re.findall(r"^  (-[^\s,]+(?:, --\S+)?)", options, re.MULTILINE)
     assert len(names) > 1
     for name in names:
-        assert name == "--help" or name.replace(" ", "") in text
+        assert name.endswith("--help") or name.replace(" ", "") in text
 
 
 def test_every_command_is_in_it(page: Path) -> None:

@@ -9,7 +9,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from tests.daemon.running import HAPTICD, Daemon, wait_until
+from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, wait_until
 
 
 def status(runtime: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -42,6 +42,10 @@ def test_every_daemon_that_lives_is_shown_and_what_a_killed_one_left_is_not(tmp_
                 assert plain.stdout.startswith("default: armed, law ring-damping, ")
                 assert "\nleft: " in plain.stdout
                 assert status(runtime, "--instance", "left").stdout.startswith("left: ")
+                stop = [HAPTICD, "stop", "--instance", "left"]
+                assert subprocess.run(stop, env=environment, check=False).returncode == 0
+                assert status(runtime, "--instance", "left").returncode == 1, "when it returns the daemon has ended"
+                assert left.wait(PATIENCE_S) == 0
             finally:
                 left.send_signal(signal.SIGTERM)
 

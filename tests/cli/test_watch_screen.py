@@ -57,9 +57,10 @@ def test_whatever_is_known_the_picture_has_the_size_of_the_terminal(
 
 def test_a_latched_fault_says_how_to_go_on() -> None:
     known = ScreenState()
-    known.take([Status(latched=True, law="tdpa")], 0.0)
+    known.take([Status(latched=True, law="tdpa", rate_hz=1000.0)], 0.0)
     text = "\n".join(line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0))
     assert "LATCHED" in text
+    assert "loop ? of 1000 Hz" in text, "a rate that is not known yet is not 0"
     assert "hapticd clear" in text
 
 

@@ -98,7 +98,8 @@ def test_couplings_and_forces_stand_behind_walls_and_objects_under_their_names()
     assert "tool held 0.50 N damping 3.5 N s/m" in one_line(known)
     assert "field let go damping 0.0 N s/m" in one_line(known)
     known.take([Touch(1.0, 100, (0.1, 0.0, 0.0), remote=1)], 0.0)
-    assert "0.10 N +x  damping   3.5 N s/m  fades out" in "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+    text = "\n".join(line.plain for line in frame(known, "ipc://here", 100, 40, 0.0))
+    assert "0.10 N +x  damping   3.5 N s/m  fades out" in text
 
 
 def test_eighty_columns_cut_no_line_of_what_is_touched_or_driven() -> None:

@@ -266,7 +266,7 @@ def test_an_event_before_the_first_tick_is_kept_until_there_is_a_stream(kept: li
 
 @pytest.mark.parametrize(("ticks_s", "told_s"), [(-3600.0, 0.0), (3600.0, 3600.0), (None, 3600.0), (0.0, 0.0)])
 def test_a_text_is_of_now_whatever_the_clock_did(kept: list[Kept], ticks_s: float | None, told_s: float) -> None:
-    """A clock set ahead, told before a tick shows it; one set back, which no daemon follows, after and before a tick."""
+    """Set ahead and told before a tick shows it; set back, which no daemon follows, and told after or before a tick."""
     bridge = Bridge()
     now_s, today_s = time.monotonic(), time.time()
     if ticks_s is not None:

@@ -51,5 +51,5 @@ app = lazy_group(
         ),
     },
     help="Measure what the service costs on this machine, next to a reference measured in the same run.",
-    epilog="Example: hapticd bench tick    What the figures mean: docs/benchmarks.md",
+    epilog="What the figures mean: docs/benchmarks.md\n\nExample: hapticd bench tick",
 )

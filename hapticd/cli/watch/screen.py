@@ -169,8 +169,11 @@ def _warnings(status: Status) -> list[Text]:
 
 def _loop(known: ScreenState, status: Status, width: int) -> Text:
     line = _quiet(" loop ")
-    off = abs(status.measured_rate_hz - status.rate_hz) > 0.01 * status.rate_hz
-    line.append(f"{status.measured_rate_hz:.1f}", "bold yellow" if off else "bold").append(f" of {status.rate_hz:g} Hz")
+    rate_hz = status.measured_rate_hz  # 0: not known yet
+    off = rate_hz and abs(rate_hz - status.rate_hz) > 0.01 * status.rate_hz
+    line.append(f"{rate_hz:.1f}" if rate_hz else "?", "bold yellow" if off else "bold").append(
+        f" of {status.rate_hz:g} Hz"
+    )
     if status.late_histogram:
         if width > _NARROW:
             line.append("  late ", _QUIET).append_text(_late_bars(status))

@@ -38,7 +38,9 @@ def command(
     something disagrees, and the command that repeats it alone is listed. Interrupted, the same command goes on where
     it was.
 
-    Example: hapticd study extremes --output extremes    hapticd study extremes --point 1:57
+    Example: hapticd study extremes --output extremes
+
+    Example: hapticd study extremes --point 1:57
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)

@@ -38,7 +38,9 @@ def command(
     the last law does not hold it says which dampers do. Writes a picture, CSV and JSON. Interrupted, the
     same command goes on where it was.
 
-    Example: hapticd study remote --output remote    hapticd study remote --replay force:1:17
+    Example: hapticd study remote --output remote
+
+    Example: hapticd study remote --replay force:1:17
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)

@@ -36,7 +36,9 @@ def command(
     Every device that energy-cycle does not settle is listed with the reason and the command that replays it. Writes a
     picture, CSV and JSON. Interrupted, the same command goes on where it was.
 
-    Example: hapticd study robustness --seed 7 --output robust    hapticd study robustness --only 7:57 --output robust
+    Example: hapticd study robustness --seed 7 --output robust
+
+    Example: hapticd study robustness --only 7:57 --output robust
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)

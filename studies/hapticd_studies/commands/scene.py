@@ -35,7 +35,7 @@ def command(
     changes) and says what that does to verdict, settling time, force, energy and shown stiffness, and how many
     instructions a tick it saves. Then takes out all that can go together. Comments of the file stay.
 
-    Example: hapticd study scene --config lab.toml --tolerance 0.02 --output minimal.toml
+    Example: hapticd study scene --config lab.toml --output minimal.toml
     """
     require_extra("study", "numpy", "scipy")
     if not 0.0 <= tolerance <= 10.0:

@@ -43,8 +43,9 @@ def command(
     1 N/m. Then random devices press random shapes, edges and corners, and the loop's own proxy is stepped there.
     Writes a picture, CSV and JSON.
 
-    Example: hapticd study space --mass 0.2,0.2,0.35 --damping 4.4 --delay 1 --output directions
-    hapticd study space --mass 0.25 --linkage 0.06,0,0.04 --damping 4.4 --output omega
+    Example: hapticd study space --mass 0.2,0.2,0.35 --damping 4.4 --delay 1
+
+    Example: hapticd study space --mass 0.25 --linkage 0.06,0,0.04
     """
     require_extra("study", "numpy", "scipy", "matplotlib")
     import numpy as np

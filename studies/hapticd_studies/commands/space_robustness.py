@@ -34,7 +34,9 @@ def command(
     configuration: --only prints it, for `hapticd simulate`. Writes CSV and JSON. Interrupted, the same command goes on
     where it was.
 
-    Example: hapticd study space-robustness --cases 200    hapticd study space-robustness --only 1:75 > case.toml
+    Example: hapticd study space-robustness --cases 200
+
+    Example: hapticd study space-robustness --only 1:75 > case.toml
     """
     require_extra("study", "numpy", "numba")
     require_cluster(cluster)

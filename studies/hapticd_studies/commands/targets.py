@@ -40,7 +40,9 @@ def command(
     and against pulls, with a picture. With --missed, other settings, other laws and dampers chosen for each device, at
     each target that the default misses. Interrupted, the same command goes on where it was.
 
-    Example: hapticd study targets --share 0.15    hapticd study targets --missed --share 0.05
+    Example: hapticd study targets --share 0.15
+
+    Example: hapticd study targets --missed --share 0.05
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)

@@ -47,7 +47,9 @@ def command(
     damping over the least that holds (by bisection), settling over the best constant damper, displayed stiffness, and
     what of the rest is felt. Writes a picture, CSV and JSON. Interrupted, the same command goes on where it was.
 
-    Example: hapticd study transparency --seed 7 --output hands    hapticd study transparency --replay 7:57
+    Example: hapticd study transparency --seed 7 --output hands
+
+    Example: hapticd study transparency --replay 7:57
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)

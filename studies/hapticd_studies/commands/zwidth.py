@@ -53,7 +53,7 @@ def command(
     force-limit, drop, hand-mass, hand-damping, hand-stiffness. Writes a picture with the analytic limits, CSV and JSON.
     Interrupted, the same command goes on where it was.
 
-    Example: hapticd study zwidth --x stiffness=1e3..40e3 --y rate=500..4000 --laws none,energy-cycle --output maps
+    Example: hapticd study zwidth --y rate=500..4000 --laws none,energy-cycle
     """
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)

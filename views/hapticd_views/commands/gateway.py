@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hapticd.cli.group import Overview
 from hapticd.errors import ClientError
 from hapticd.paths import DEFAULT_INSTANCE
 
 if TYPE_CHECKING:
     from hapticd_views.gateway.follower import Device
 
-app = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+app = typer.Typer(cls=Overview, rich_markup_mode=None, no_args_is_help=True)
 
 HOST = "127.0.0.1"
 PORT = 10001

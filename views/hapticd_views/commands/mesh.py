@@ -33,7 +33,7 @@ def command(
     The mesh must be closed and face outward. What is stated with the field is how far its distance is off near the
     surface: a smaller --voxel makes less of it, most of all at sharp edges, where it is a quarter of the spacing.
 
-    Example: hapticd mesh bracket.stl --scale 0.001 --voxel 0.0005 --output bracket.field
+    Example: hapticd mesh bracket.stl --scale 0.001 -o bracket.field
     """
     try:
         from hapticd_views.mesh.reading import read_mesh

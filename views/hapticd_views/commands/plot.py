@@ -56,8 +56,9 @@ def plot(
 
     Position and force are along the first wall's normal, negative positions inside it.
 
-    Example: hapticd plot before.mcap after.mcap --figure stiffness --contact --output both.pdf
-    hapticd plot table.csv --figure scene --config config/table-edge.toml --output table.png
+    Example: hapticd plot before.mcap after.mcap -f stiffness -o both.pdf
+
+    Example: hapticd plot run.csv -f scene -c config/table-edge.toml -o run.png
     """
     from hapticd_views.commands.needs import record_and_figures
 

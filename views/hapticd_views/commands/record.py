@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hapticd.cli.group import Overview
 from hapticd.errors import HapticdError
 from hapticd.paths import DEFAULT_INSTANCE
 from hapticd_views.commands.signals import stop_signals
@@ -20,7 +21,7 @@ from hapticd_views.commands.signals import stop_signals
 if TYPE_CHECKING:
     from hapticd_views.recording.recorder import Progress
 
-app = typer.Typer(rich_markup_mode=None)
+app = typer.Typer(cls=Overview, rich_markup_mode=None)
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the output file if it exists.")]
