@@ -6,7 +6,7 @@ import json
 import re
 import types
 import typing
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
 import annotated_types
@@ -72,7 +72,14 @@ class Problems:
         tables, field = _declaration(model, path)
         if detail["type"] == "extra_forbidden":
             known = sorted({name for table in tables for name in table.model_fields})
-            self.add((*at, *path), f"unknown key; {nearest(str(path[-1]), known)}", detail["input"])
+            advice = nearest(str(path[-1]), known)
+            if "did you mean" not in advice:
+                advice += _elsewhere(tables, (*at, *path[:-1]))
+            self.add((*at, *path), f"unknown key; {advice}", detail["input"])
+        elif detail["type"] in ("tuple_type", "list_type") and isinstance(detail["input"], dict):
+            where = key_path((*at, *path))
+            advice = "" if "[" in where else f": write [[{where}]]"
+            self.add((*at, *path), f"must be an array{advice}", detail["input"])
         elif detail["type"] in ("missing", "union_tag_not_found"):
             meaning = f": {field.description}" if field and field.description else ""
             self.add((*at, *path), f"this key is required{meaning}")
@@ -160,6 +167,13 @@ def tables_of(annotation: Any) -> Iterator[type[BaseModel]]:
         return
     for part in typing.get_args(annotation):
         yield from tables_of(part)
+
+
+def _elsewhere(tables: Iterable[type[BaseModel]], at: Sequence[Key]) -> str:
+    """Where the keys of the plug-in stand that a table names, for those who wrote them into the table itself."""
+    fields = ((name, field) for table in tables for name, field in table.model_fields.items())
+    own = ((name, field) for name, field in fields if typing.get_origin(field.annotation) is dict)
+    return "".join(f"; {field.description} stand in [{key_path((*at, name))}]" for name, field in own)
 
 
 def _sentence(detail: ErrorDetails, field: FieldInfo | None) -> str:

@@ -40,7 +40,9 @@ EXAMPLES = {
     "scene = 3": "scene = 3: must be a table",
     "[device]\noptions = []": "device.options = []: must be a table",
     "controller = { params = 5 }": "controller.params = 5: must be a table",
-    "[scene]\nwalls = {}": "scene.walls = {}: must be an array",
+    "[scene]\nwalls = {}": "scene.walls = {}: must be an array: write [[scene.walls]]",
+    "[scene.walls]\naxis = 'z'": "scene.walls = {...}: must be an array: write [[scene.walls]]",
+    "[[scene.walls]]\nstiffness_n_per_m = 1\nchanges = {}": "scene.walls[0].changes = {}: must be an array",
     "[scene]\nwalls = [1]": "scene.walls[0] = 1: must be a table",
     "[scene]\nwalls = [" + "{ stiffness_n_per_m = 1 }," * 9 + "]": (
         "scene.walls = [...]: must have 8 entries at most, not 9"
@@ -50,6 +52,10 @@ EXAMPLES = {
     "[[scene.walls]]\naxis = 'z'": "scene.walls[0].stiffness_n_per_m: this key is required: spring stiffness [N/m]",
     "[loop]\nrate = 5": 'loop.rate = 5: unknown key; did you mean "rate_hz"?',
     "[velocity]\nqqq = 5": "velocity.qqq = 5: unknown key; known here: cutoff_hz, estimator, noise_m, samples",
+    "[controller]\nwindow = 2": (
+        "controller.window = 2: unknown key; known here: law, params; the law's own parameters stand in "
+        "[controller.params]"
+    ),
     "[contoller]\nlaw = 'none'": 'contoller = {...}: unknown key; did you mean "controller"?',
     "[loop]\n'a b' = 5": ('loop."a b" = 5: unknown key; known here: cpu, law_budget, priority, rate_hz, realtime'),
     # several keys together
