@@ -131,4 +131,4 @@ def _lines(looked: Discovery) -> Iterator[tuple[Row, tuple[Details, ...]]]:
     if looked.problem:
         yield (looked.driver, "-", "-", "-", "could not look"), ((looked.problem, ()), *lacks)
     elif not looked.devices:
-        yield (looked.driver, "-", "-", "-", f"none found: {looked.absent}"), tuple(lacks)
+        yield (looked.driver, "-", "-", "-", "none found"), ((looked.absent, ()), *lacks)

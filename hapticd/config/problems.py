@@ -151,7 +151,10 @@ def allowed_range(field: FieldInfo) -> str:
                 high = f"less than {_number(most)}"
     unit = f" {unit_of(field)}" if unit_of(field) else ""
     if low and high:
-        return f"{low} and at most {high}{unit}" if "than" in low else f"from {low} to {high}{unit}"
+        if "than" not in low and "than" not in high:
+            return f"from {low} to {high}{unit}"
+        least = low if "than" in low else f"at least {low}"
+        return f"{least} and {high if 'than' in high else f'at most {high}'}{unit}"
     if low:
         return f"{low}{unit}" if "than" in low else f"{low}{unit} or more"
     if high:

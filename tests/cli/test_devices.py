@@ -66,7 +66,7 @@ def test_a_driver_that_found_none_says_what_to_do_and_what_this_computer_lacks(
         "find(cls, options=None): return []", f"diagnose(cls, options=None): return [{lacks}]",
     )  # fmt: skip
     shown = hapticd("devices").stdout
-    assert "none found: plug it in\n    no library\n    apt install it\n" in shown
+    assert "none found\n    plug it in\n    no library\n    apt install it\n" in shown
     assert "well" not in shown
     assert [one["mark"] for one in listed()["odd"]["diagnoses"]] == ["ok", "problem"]
 

@@ -58,6 +58,9 @@ EXAMPLES = {
     ),
     "[contoller]\nlaw = 'none'": 'contoller = {...}: unknown key; did you mean "controller"?',
     "[loop]\n'a b' = 5": ('loop."a b" = 5: unknown key; known here: cpu, law_budget, priority, rate_hz, realtime'),
+    "[device]\ndriver = 'serial-rig'\n[[device.options.axes]]\nforce_scale = 20": (
+        "device.options.axes[0].force_scale = 20: must be more than 0.1 and less than 10 N"
+    ),
     # several keys together
     "[[scene.walls]]\nstiffness_n_per_m = 1\nchanges = [{ at_s = 1 }]": (
         "scene.walls[0].changes[0]: must name a new stiffness_n_per_m or damping_n_s_per_m"

@@ -139,7 +139,7 @@ def test_no_sdk(tmp_path: Path) -> None:
     assert diagnosis["mark"] == "problem"
     assert f"{nowhere}: no libdrd.so in it" in diagnosis["text"]
     shown = lab.hapticd("devices")
-    assert "none found: plug it in, and switch its power supply on" in shown
+    assert "none found\n    plug it in, and switch its power supply on" in shown
     assert "download the SDK from forcedimension.com" in shown
     ((mark, text, mend),) = lab.doctor("driver.needs")
     assert (mark, "the Force Dimension SDK cannot be loaded" in text) == ("problem", True)
@@ -167,7 +167,9 @@ def test_the_sdk_but_no_device(lab: Lab, bench: Bench) -> None:
     assert row["devices"] == []
     assert [one["text"] for one in row["diagnoses"]][1] == "the SDK finds no device"
     shown = lab.hapticd("devices").splitlines()
-    assert any(line.startswith("omega7") and "none found: plug it in" in line for line in shown)
+    at = next(index for index, line in enumerate(shown) if line.startswith("omega7"))
+    assert shown[at].endswith("none found")
+    assert shown[at + 1].startswith("    plug it in")
     library, count = lab.doctor("driver.needs")
     # The fake is below /tmp, as an SDK may be that somebody has just unpacked.
     assert library[0] == "advice"
