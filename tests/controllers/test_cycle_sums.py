@@ -13,26 +13,28 @@ from hapticd_controllers import energy_cycle, late_cycle
 from hapticd_controllers.cycle_sums import begin, end
 
 PUSH_N = 3.0
+STEP_M = PERIOD_S = 2.0**-10
+"""A step of a millimetre in a millisecond, so that sums of them are exact."""
 LAWS = pytest.mark.parametrize("law", [energy_cycle, late_cycle], ids=["energy_cycle", "late_cycle"])
 
 
 class Contact:
-    """A law that is shown a contact of 3 N, pressed and released by so much at each sample; a rise takes energy."""
+    """A law that is shown a contact of 3 N, pressed and released by a step at each sample; a rise takes energy."""
 
     def __init__(self, law: ModuleType, **params: Any) -> None:
         self.law = law
         self.params = plain_object("Params", scalar_params(law.Params(**params)))
         self.state = fresh_state(law)
-        law.start(self.state, self.params, LawSnapshot(x_m=-5e-3))
-        self.tick = LawTick(x_m=-5e-3, in_contact=True, contact_n=PUSH_N)
+        law.start(self.state, self.params, LawSnapshot(x_m=-5.0 * STEP_M))
+        self.tick = LawTick(STEP_M, x_m=-5.0 * STEP_M, dt_s=PERIOD_S, in_contact=True, contact_n=PUSH_N)
 
     def goes(self, *steps: int) -> list[float]:
-        """The damping after each step in or out, of 1 mm, under the force that is held since the last."""
+        """The damping after each step in or out, under the force that is held since the last."""
         found = []
         for step in steps:
             tick = self.tick
             tick.applied_n = tick.applied_contact_n = PUSH_N
-            tick.moved_m = -1e-3 * step
+            tick.moved_m = -STEP_M * step
             tick.velocity_m_per_s = tick.moved_m / tick.dt_s
             tick.x_m += tick.moved_m
             self.law.step(self.state, self.params, tick)
@@ -90,3 +92,17 @@ def test_what_a_cycle_has_taken_makes_the_damping_negative_nothing_or_what_it_wa
     """15 mJ in, 6 out again: 9 mJ more than it generated, in 7 ms at 1 m/s."""
     contact = Contact(energy_cycle, rule=rule, cap="none")
     assert contact.goes(1, 1, 1, 1, 1, -1, -1, 1, 1)[-1] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("least", "counts"), [(0.0, True), (2.0, True), (2.001, False)])
+def test_a_cycle_that_travels_less_than_the_least_changes_nothing(least: float, counts: bool) -> None:
+    """Two counts out and two back."""
+    assert (Contact(energy_cycle, min_travel_counts=least).goes(-1, -1, 1, 1)[-1] > 0.0) == counts
+
+
+@pytest.mark.parametrize(("small", "leaks", "expected"), [(2.0, 0.5, 3.0), (2.001, 0.5, 1.5), (2.001, 0.0, 3.0)])
+def test_a_cycle_that_travels_less_than_a_small_one_adds_no_more_than_its_leaks(
+    small: float, leaks: float, expected: float
+) -> None:
+    contact = Contact(energy_cycle, small_travel_counts=small, small_leaks=leaks)
+    assert contact.goes(-1, -1, 1, 1)[-1] == pytest.approx(expected)
