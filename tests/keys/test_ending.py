@@ -88,10 +88,25 @@ def test_while_the_memory_is_full_senders_are_ended_and_then_all(
         told = [record.getMessage() for record in caplog.records]
         assert len(told) == sum(ended)
         assert all("fills the memory; those that send were disconnected" in line for line in told)
-        bound._endpoints = {}
-        bound._look_at_memory()
-        monkeypatch.setattr(bound._memory, "turn", lambda _now_s: pytest.fail("it has just been looked at"))
-        bound._look_at_memory()
+
+
+def test_the_memory_is_looked_at_every_fifty_milliseconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    looks: list[float] = []
+
+    def look(now_s: float) -> Culprits:
+        looks.append(now_s)
+        return Culprits.NO_ONE
+
+    with bound_of(9, keep_heard=True) as bound:
+        bound._closed.set()
+        bound._thread.join()
+        bound._looked_s = 0.0
+        monkeypatch.setattr(bound._memory, "turn", look)
+        with monkeypatch.context() as clock:
+            for at_ms in range(1000, 1206):
+                clock.setattr(time, "monotonic", lambda now_s=at_ms / 1e3: now_s)
+                bound._look_at_memory()
+    assert looks == pytest.approx([1.0, 1.05, 1.1, 1.15, 1.2], abs=1.1e-3)
 
 
 def has_ended(client: sockets.socket) -> bool:

@@ -51,6 +51,29 @@ def test_for_a_second_those_that_send_are_ended_then_all_and_then_the_bound_is_f
     assert bound.turn(11.0) is Culprits.SENDERS
 
 
+def test_what_is_free_is_given_back_before_any_connection_is_ended(
+    held: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The C library keeps what ended connections had; that is no reason to end more."""
+    given: list[int] = []
+    monkeypatch.setattr(memory, "_give_back", lambda: given.append(held.pop()))
+    bound = MemoryBound(BOUND)
+    held.append(BOUND)
+    assert bound.turn(0.0) is Culprits.NO_ONE
+    assert given == []
+    held.append(BOUND + 1)
+    assert bound.turn(1.0) is Culprits.NO_ONE
+    assert given == [BOUND + 1]
+
+
+def test_what_was_freed_is_no_longer_resident_once_it_is_given_back() -> None:
+    many = [bytes(100_000) for _ in range(640)]
+    before = resident_bytes()
+    many[:-1] = []
+    memory._give_back()
+    assert resident_bytes() < before - (40 << 20)
+
+
 def test_once_it_has_helped_the_next_time_is_as_the_first(held: list[int]) -> None:
     bound = MemoryBound(BOUND)
     for start_s in (0.0, 100.0):
