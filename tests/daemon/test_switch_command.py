@@ -16,10 +16,19 @@ from tests.daemon.test_switching import Asker
 
 
 @pytest.fixture(scope="module")
-def daemon() -> Iterator[Daemon]:
+def running() -> Iterator[Daemon]:
     with Daemon(PRESSED).wait_ready() as running:
         pressing(running)
         yield running
+
+
+@pytest.fixture
+def daemon(running: Daemon) -> Daemon:
+    """As it was at first, whatever was switched before."""
+    running.config.write_text(PRESSED)
+    with Asker(running) as ask:
+        assert ask("reload", wait=True)["ok"]
+    return running
 
 
 def switch(daemon: Daemon, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
