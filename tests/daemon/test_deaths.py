@@ -100,7 +100,7 @@ def test_a_killed_supervisor_takes_the_force_with_it(record_property: Report) ->
 
 def test_a_supervisor_that_sleeps_for_a_while_costs_the_loop_nothing() -> None:
     with (
-        Daemon(PRESSED).wait_ready() as brief,
+        Daemon(PRESSED + "[telemetry]\nsend_high_water = 20000\n").wait_ready() as brief,  # it sends 3 s at once
         Daemon(PRESSED + "[safety]\nsupervisor_stall_s = 60.0\n").wait_ready() as long,
         Daemon(PRESSED + "[safety]\nsupervisor_stall_s = 1.0\n").wait_ready() as strict,
         Subscriber(brief.endpoint) as from_brief,
