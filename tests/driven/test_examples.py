@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.client import Client, Event, EventCode
+from hapticd.client import Client, Event, EventCode, Status
 from tests.daemon.running import PATIENCE_S, Daemon
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples" / "driven"
@@ -52,7 +52,8 @@ def test_a_curl_field_pushes_across_the_motion(daemon: Daemon) -> None:
 
 def test_an_experiment_learns_from_which_tick_each_stiffness_holds(daemon: Daemon) -> None:
     """A marker has the same tick, and a stiffer spring to the middle keeps the hand nearer to it."""
-    with Client(daemon.endpoint, topics=[Event], timeout_s=PATIENCE_S) as client:
+    with Client(daemon.endpoint, topics=[Event, Status], timeout_s=PATIENCE_S) as client:
+        client.wait_for(Status, timeout_s=PATIENCE_S)  # it is heard
         printed = said(daemon, "trials.py", 1.0)
         marks = [client.wait_for(EventCode.MARKED, timeout_s=PATIENCE_S).text for _ in range(3)]
     trials = re.findall(r"(\d+) N/m from tick (\d+): up to (\d+\.\d) mm\n", printed)
