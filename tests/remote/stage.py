@@ -85,21 +85,23 @@ def drives_the_tool(command: Sequence[str | Path]) -> None:
 
     A program that gets no processor for a while reads old ticks after that: three of its lines must be in time.
     """
-    with Daemon(CONFIG).wait_ready() as daemon:
-        with subprocess.Popen([*command, runtime(daemon)], stdout=subprocess.PIPE, text=True) as program:
-            try:
-                assert program.stdout is not None
-                soon = 0
-                for turn in range(1, 31):
-                    line = program.stdout.readline().strip()
-                    said = re.fullmatch(r"tick (\d+) message (\d+) in force, of (\d+), force (\S+)", line)
-                    assert said is not None, line
-                    assert int(said[3]) == 100 * turn
-                    assert int(said[2]) < int(said[3]), "never before it is sent"
-                    assert abs(float(said[4])) <= MAX_FORCE_N
-                    soon += int(said[3]) - int(said[2]) < 20
-                    if soon == 3:
-                        break
-                assert soon == 3, "a message is in force soon"
-            finally:
-                program.kill()
+    with (
+        Daemon(CONFIG).wait_ready() as daemon,
+        subprocess.Popen([*command, runtime(daemon)], stdout=subprocess.PIPE, text=True) as program,
+    ):
+        try:
+            assert program.stdout is not None
+            soon = 0
+            for turn in range(1, 31):
+                line = program.stdout.readline().strip()
+                said = re.fullmatch(r"tick (\d+) message (\d+) in force, of (\d+), force (\S+)", line)
+                assert said is not None, line
+                assert int(said[3]) == 100 * turn
+                assert int(said[2]) < int(said[3]), "never before it is sent"
+                assert abs(float(said[4])) <= MAX_FORCE_N
+                soon += int(said[3]) - int(said[2]) < 20
+                if soon == 3:
+                    break
+            assert soon == 3, "a message is in force soon"
+        finally:
+            program.kill()
