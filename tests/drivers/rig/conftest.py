@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticd_drivers.rig import conversation
+from hapticd_drivers.rig import conversation, mover
 from hapticd_drivers.rig.serial_rig import SerialRig, SerialRigOptions
 from tests.drivers.rig.device import PATIENCE_S, Rig, build
 from tests.drivers.rig.ticking import PERIOD_S, MakeDriver, tick
@@ -27,6 +27,7 @@ def rig(rig_core: ctypes.CDLL, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """A rig in this process; nothing is urgent here, since a busy computer must not look like a silent rig."""
     monkeypatch.setattr(conversation, "PATIENCE_S", PATIENCE_S)
     monkeypatch.setattr(conversation, "URGENT_PATIENCE_S", PATIENCE_S)
+    monkeypatch.setattr(mover, "ANSWER_S", PATIENCE_S)
     with Rig(rig_core, tmp_path / "port") as made:
         yield made
 
