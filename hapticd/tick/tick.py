@@ -172,7 +172,7 @@ class ControlTick:
         self.fallback = False
         for contact, law in laws:
             self._take_law(contact, law)
-        for contact in self.leaving:
+        for contact in self._fading_out():
             self._blend(contact)
         return True
 
@@ -377,6 +377,9 @@ class ControlTick:
 
     def _under_law(self) -> list[Contact]:
         return self.contacts  # all that have a law of [controller]
+
+    def _fading_out(self) -> list[Contact]:
+        return self.leaving  # all that hold what is left of a force
 
     def _axes_under_law(self) -> list[PortAxis]:
         return axes_of([*self.couplings, *self.leaving_ports])  # all that have a law of [remote]

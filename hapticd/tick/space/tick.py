@@ -281,6 +281,9 @@ class SpaceTick(ControlTick):
     def _under_law(self) -> list[Contact]:
         return [*self.contacts, *(channel for contact in self.solids for channel in contact.channels)]
 
+    def _fading_out(self) -> list[Contact]:
+        return [*self.leaving, *(channel for contact in self._fading for channel in contact.channels)]
+
     def _stand(self) -> None:
         super()._stand()
         x, y, z = self.motion.position_m

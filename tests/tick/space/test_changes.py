@@ -53,6 +53,23 @@ def test_no_force_jumps_when_an_object_changes(after: str) -> None:
     assert rig.unbalanced_j() < 1e-13
 
 
+@pytest.mark.parametrize("after", ["", ball(radius_m=0.0302)], ids=["gone", "changed"])
+def test_no_force_jumps_when_it_is_armed_again_while_an_object_still_fades_out(after: str) -> None:
+    """It would have stood in what the release had left of it."""
+    rig = pressed()
+    rig.switch(after).to((0.0, 0.0, 0.0292), 5)
+    rig.tick.release()
+    rig.to((0.0, 0.0, 0.0292), 20)
+    before = rig.force
+    assert rig.tick.guard.gain < 0.7
+    rig.tick.arm()
+    rig.go((0.0, 0.0, 0.0292))
+    assert before[2] > 1.0
+    assert apart(rig.force, before) <= 2.0 * 12.0 / RAMP_TICKS
+    rig.to((0.0, 0.0, 0.0292), 2 * RAMP_TICKS)
+    assert rig.unbalanced_j() < 1e-13
+
+
 def test_friction_that_is_taken_away_takes_its_laws_along_and_new_friction_learns_anew() -> None:
     rough = ball(static_friction=0.5, dynamic_friction=0.4)
     rig = pressed(rough).to((0.002, 0.0, 0.0292), 60)
