@@ -11,6 +11,7 @@ from hapticd.config.walls import WallConfig
 from hapticd.law import LawParams
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.scene import Wall
+from hapticd_controllers import virtual_coupling
 from tests.tick.rig import law
 
 PERIOD_S = 1e-3
@@ -185,3 +186,16 @@ def test_parameters_arrive_as_plain_numbers() -> None:
     running = RunningLaw(module, Two(gain=3.0))
     assert running.step(running.state, running.params, None) == 3.0
     assert not isinstance(running.params, LawParams)
+
+
+def test_a_law_that_is_made_once_more_has_nothing_that_the_first_one_changes() -> None:
+    """Couplings have one an axis."""
+    first = RunningLaw(virtual_coupling, virtual_coupling.Params())
+    twin = first.another()
+    for one in (first.state, first.params):
+        for name in type(one).__slots__:
+            setattr(one, name, 7)
+    fresh = RunningLaw(virtual_coupling, virtual_coupling.Params())
+    for same, one in ((fresh.state, twin.state), (fresh.params, twin.params)):
+        assert repr(one) == repr(same)
+    assert twin.rests is fresh.rests is False

@@ -299,3 +299,15 @@ def test_one_that_forgets_it_while_it_is_let_go_loses_the_rest_of_its_force_at_o
     assert rig.forces(-2e-3, 11)[-1] == 0.0
     assert rig.tick.guard.mode is Mode.DISARMED
     assert rig.tick.fault == 0
+
+
+@pytest.mark.parametrize("clock_dt_s", [-1e-3, -math.inf, math.inf, math.nan, 0.0])
+def test_a_clock_that_goes_back_or_tells_no_time_takes_no_ramp_further(clock_dt_s: float) -> None:
+    rig = pressed()
+    rig.tick.release()
+    (before_n,) = rig.forces(-2e-3, 10)[-1:]
+    rig.sample.time_ns += 1_000_000
+    rig.sample.sequence += 1
+    assert list(rig.tick.advance(rig.sample, clock_dt_s)) == pytest.approx([before_n])
+    assert before_n > 0.5
+    assert rig.forces(-2e-3, 1)[-1] == pytest.approx(before_n - 4.0 / RAMP_TICKS)
