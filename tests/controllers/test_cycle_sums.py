@@ -106,3 +106,17 @@ def test_a_cycle_that_travels_less_than_a_small_one_adds_no_more_than_its_leaks(
 ) -> None:
     contact = Contact(energy_cycle, small_travel_counts=small, small_leaks=leaks)
     assert contact.goes(-1, -1, 1, 1)[-1] == pytest.approx(expected)
+
+
+@LAWS
+@pytest.mark.parametrize(("samples", "felt_kg"), [(19.999, 0.0), (20.0, 0.5)])
+def test_a_mass_is_believed_at_the_end_of_a_cycle_from_twenty_samples_on(
+    law: ModuleType, samples: float, felt_kg: float
+) -> None:
+    """Evidence of 0.5 kg: speeds that change by 2 where the impulse is 1."""
+    contact = Contact(law)
+    contact.goes(-1, -1, 1)
+    state = contact.state
+    state.count, state.sum_uu, state.sum_uw = samples, 1.0, 2.0
+    contact.goes(1)
+    assert state.felt_mass_kg == pytest.approx(felt_kg)
