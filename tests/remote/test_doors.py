@@ -245,3 +245,20 @@ class Knocking:
         self.socket.disable_monitor()
         self._news.close(0)
         self.socket.close()
+
+
+def test_each_door_bounds_what_waits_and_expects_signs_of_life_from_other_computers(tmp_path: Path) -> None:
+    """A power cut ends no connection by itself, and what ZeroMQ collects has no bound of its own."""
+    bounds = (zmq.MAXMSGSIZE, zmq.RCVHWM, zmq.HEARTBEAT_IVL, zmq.HEARTBEAT_TIMEOUT)
+    with opened() as doors:
+        sockets = (doors.scene._bound.socket, doors.state._bound.socket)
+        assert [[socket.getsockopt(bound) for bound in bounds] for socket in sockets] == [
+            [4096, 100, 1000, 4000],
+            [1024, 10, 1000, 4000],
+        ]
+        assert sockets[1].getsockopt(zmq.SNDHWM) == 1000
+    local = StateSocket(tmp_path / "state", None, None)
+    try:
+        assert [local._bound.socket.getsockopt(bound) for bound in bounds[:3]] == [128, 10, 0]
+    finally:
+        local.close()
