@@ -112,6 +112,15 @@ def test_of_the_messages_under_way_the_newest_are_remembered_and_none_of_another
     assert sum(port.round_trips.counts) == 1, "the other one's answered a state, this one's none"
 
 
+def test_a_message_waits_to_be_in_force_while_a_larger_number_of_the_owner_before_still_is(port: LeasedPort) -> None:
+    say(port, ONE, 0, 900)
+    port.now_in_force(900, 1, MS, MS)
+    assert say(port, TWO, 1500, 1)
+    port.now_in_force(900, 1501, 1501 * MS, MS)
+    port.now_in_force(1, 1502, 1502 * MS, MS)
+    assert sum(port.ages.counts) == 2
+
+
 @pytest.mark.parametrize(("state_seq", "counts"), [(0, 1), (101, 1), (102, 0)])
 def test_a_tick_that_is_still_to_come_has_not_been_answered(port: LeasedPort, state_seq: int, counts: int) -> None:
     say(port, ONE, 100, 1, state_seq=state_seq)
