@@ -15,7 +15,11 @@ from tests.telemetry.sockets import Wire
 
 
 class Stage:
-    """A publisher with a status twice a second, in a thread of its own."""
+    """A publisher with a status twice a second, in a thread of its own.
+
+    Attributes:
+        last: number of the last tick that it was given; -1 before the first.
+    """
 
     def __init__(self) -> None:
         self._wire = Wire(say_status=False)
@@ -24,6 +28,7 @@ class Stage:
         self._over = threading.Event()
         self.endpoint = self._wire.endpoint
         self.directory = self._wire.directory
+        self.last = -1
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
@@ -37,6 +42,7 @@ class Stage:
 
     def play(self, ticks: Sequence[TickRecord]) -> None:
         """Have ticks published, behind those before."""
+        self.last = ticks[-1].seq
         self._play.put(list(ticks))
 
     def event(self, event: LoopEvent) -> None:
@@ -69,9 +75,11 @@ class Stage:
                     self._wire.say(topic, payload)
                 case int():
                     schema, due_s = item, 0.0
+                    publisher._status = None  # nor is one who comes anew told another
             publisher.service()
             if time.monotonic() >= due_s:
                 due_s = time.monotonic() + 0.5
-                publisher.status(self._status)
-                if schema != SCHEMA:
+                if schema == SCHEMA:
+                    publisher.status(self._status)
+                else:
                     self._wire.say("hapticd/status", [{**self._status, "schema": schema}])

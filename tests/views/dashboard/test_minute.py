@@ -128,15 +128,15 @@ def test_a_daemon_of_another_schema_is_said_and_its_ticks_are_not_shown(
     browser: Browser, stage: Stage, served: Served
 ) -> None:
     with browser.page(served.watch) as page:
-        has_come(page, TICKS - 1)
+        has_come(page, first := stage.last)
         stage.speak(schema=2)
         page.wait_for("document.getElementById('trouble').innerText.includes('schema 2')")
         assert page.evaluate("document.getElementById('state').textContent") == "No daemon"
-        stage.play(still(100, TICKS))
+        stage.play(still(100, first + 1))
         stage.speak(schema=1)
         page.wait_for("document.getElementById('trouble').hidden")
-        stage.play(still(100, TICKS + 100))
-        page.wait_inside(f"page.store.lastSeq === {TICKS + 199}")
+        stage.play(still(100, first + 101))
+        page.wait_inside(f"page.store.lastSeq === {first + 200}")
 
 
 @pytest.mark.parametrize("payload", ["text", [1], [{"seq": 1}], [{"timestamp": 0.0, "seq": "x"}]])
@@ -144,8 +144,7 @@ def test_a_forged_message_of_the_daemon_is_said_and_what_follows_is_shown(
     browser: Browser, stage: Stage, served: Served, payload: object
 ) -> None:
     with browser.page(served.watch) as page:
-        last = TICKS + 199
-        has_come(page, last)
+        has_come(page, stage.last)
         stage.forge("hapticd/position", payload)
         page.wait_for("document.getElementById('trouble').innerText.includes('hapticd/position')")
         page.wait_for("document.getElementById('trouble').hidden")
@@ -153,7 +152,7 @@ def test_a_forged_message_of_the_daemon_is_said_and_what_follows_is_shown(
 
 def test_lost_ticks_are_counted_and_a_restart_is_not_a_loss(browser: Browser, stage: Stage, served: Served) -> None:
     with browser.page(served.watch) as page:
-        last = TICKS + 199
+        last = stage.last
         has_come(page, last)
         before = page.inside("page.store.punctuality().lost")
         stage.play(still(50, last + 8))  # seven ticks are not there

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from websockets.sync.client import ClientConnection
 
-from hapticd.client import Client, Status
+from hapticd.client import Client, Position, Status
 from tests.daemon.running import HAPTICD, Daemon
 from tests.views.gateway.isaac import Isaac
 from tests.views.gateway.served import PATIENCE_S, PROBE, Served, answer, force, position_m, told
@@ -154,9 +154,10 @@ def test_a_client_that_pushes_and_does_not_read_is_let_go_and_costs_nothing(
 ) -> None:
     """Its place in the gateway waits for it, and neither the others nor the loop do."""
     before_kb = served.memory_kb()
-    with served.deaf() as deaf:
+    with served.deaf() as deaf, Client(daemon.endpoint, topics=[Position, Status]) as ticks:
+        ticks.wait_for(Status, timeout_s=PATIENCE_S)  # it hears every tick from now on
         deaf.say(force(1.0))
-        waits(eye, lambda at_m: at_m[0] > SEEN_M)
+        ticks.wait_for(Position, lambda tick: tick.position_m[0] > SEEN_M, timeout_s=PATIENCE_S)
         waits(eye, at_rest)
         assert served.memory_kb() < before_kb + 2_000
     with Client(daemon.endpoint, topics=[Status]) as client:
