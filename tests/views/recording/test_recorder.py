@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,10 +18,12 @@ from mcap.reader import make_reader
 
 import hapticd
 from hapticd.client import Client, Position
+from hapticd.errors import WireError
 from hapticd_views.recording import read
+from hapticd_views.recording.recorder import Limits, Recorder
 from hapticd_views.recording.scan import Scan
 from tests.daemon.running import HAPTICD, Daemon
-from tests.views.recording.made import Recording, files_up_to
+from tests.views.recording.made import ANSWER, STATUS, Recording, await_true, files_up_to, tick
 
 CONFIG = """
 # a comment is part of the configuration
@@ -61,7 +66,7 @@ def test_every_tick_marker_and_the_receipt_are_in_it(
         monkeypatch.setenv("HAPTICD_RUNTIME_DIR", runtime["HAPTICD_RUNTIME_DIR"])
         with hapticd.connect() as client:
             client.mark("now")
-        recording.has(recording.output.stat().st_size + 100_000)
+        await_true(lambda: "now" in [marker.text for marker in read(recording.output).markers], "the marker")
         code, output, errors = recording.end(signal.SIGTERM)
     assert (code, errors) == (0, "")
     told = json.loads(output)
@@ -70,11 +75,11 @@ def test_every_tick_marker_and_the_receipt_are_in_it(
     assert (told["ticks"], told["missing"]) == (len(made.topics["position"]["seq"]), made.missing)
     rows = {seq: row for row, seq in enumerate(made.ticks["seq"].tolist())}
     assert len(seen) > 50
-    for tick in seen:
-        row = rows[tick.seq]
-        assert tuple(made.ticks["position_m"][row]) == tick.position_m
-        assert tuple(made.ticks["force_requested_n"][row]) == tick.force_requested_n
-        assert made.ticks["timestamp"][row] == tick.timestamp
+    for one in seen:
+        row = rows[one.seq]
+        assert tuple(made.ticks["position_m"][row]) == one.position_m
+        assert tuple(made.ticks["force_requested_n"][row]) == one.force_requested_n
+        assert made.ticks["timestamp"][row] == one.timestamp
     assert [marker.text for marker in made.markers] == ["now"]
     assert made.receipt["config_text"] == CONFIG
     assert made.config.hash == made.receipt["config_hash"]
@@ -88,22 +93,43 @@ def test_every_tick_marker_and_the_receipt_are_in_it(
     assert np.array_equal(wall["force_requested_n"][inside], -12000.0 * wall["x_m"][inside])
 
 
+def test_what_came_before_the_end_is_in_it_though_it_was_not_read_yet(tmp_path: Path) -> None:
+    """A computer that was busy for seconds: those were not in the file, and nothing said so."""
+    dice = random.Random(1)
+    waiting: list[Any] = [tick(seq, dice) for seq in range(300)]
+    waiting.insert(100, WireError("no record"))
+
+    def receive(_timeout_s: float) -> Any:
+        come = waiting.pop(0) if waiting else []
+        if isinstance(come, WireError):
+            raise come
+        return come
+
+    daemon: Any = SimpleNamespace(latest_status=STATUS, receive=receive, receipt=lambda: ANSWER)
+    done = Recorder(daemon, tmp_path / "a.mcap", Limits()).run(lambda: True)
+    assert (done.ticks, done.refused) == (300, 1)
+    assert read(tmp_path / "a.mcap").ticks["seq"].tolist() == list(range(300))
+
+
 def test_a_kill_costs_half_a_second_at_most(daemon: Daemon, runtime: dict[str, str], tmp_path: Path) -> None:
     with (
         Client(daemon.endpoint, topics=[Position]) as witness,
         Recording(tmp_path / "killed.mcap", environment=runtime) as recording,
     ):
         recording.has(150_000)
-        while witness.receive(0.0):
-            pass
-        newest = witness.receive(30.0)[-1]
-        assert isinstance(newest, Position)
+
+        def keeps_up() -> bool:
+            """A busy computer may not let it; then what it has not read is not lost by a kill."""
+            while more := witness.receive(0.0):
+                heard_s.extend(one.timestamp for one in more if isinstance(one, Position))
+            return bool(read(recording.output).ticks["timestamp"][-1] > heard_s[-1] - 0.5)
+
+        heard_s = [witness.wait_for(Position, timeout_s=30.0).timestamp]
+        await_true(keeps_up, "the recorder to be no more than half a second behind")
         recording.process.kill()
         recording.process.wait()
     made = read(tmp_path / "killed.mcap")
     assert not made.complete
-    # What the witness has heard may not have reached the recorder yet: a message holds 20 ms of ticks.
-    assert made.ticks["timestamp"][-1] > newest.timestamp - 0.5
     for name in ("position", "energy", "damping", "timing"):
         assert set(np.diff(made.topics[name]["seq"]).tolist()) == {1} or made.gaps
     spans = []

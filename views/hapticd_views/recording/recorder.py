@@ -25,6 +25,9 @@ SYNC_S = 5.0
 MOST_UNREAD = 50_000
 """Messages that may wait while the computer is too busy for the recorder: three minutes of them at 1 kHz, 100 MB."""
 
+CATCH_UP_S = 10.0
+"""How long the end may take where the computer was too busy for what has come to be read [s]."""
+
 _WAIT_S = 0.05
 _UNEVEN_S = 1.0  # where some topics stay behind, the next file begins all the same
 _REFUSED_S = 1.0  # notes of messages that cannot be used come no faster
@@ -120,7 +123,7 @@ class Recorder:
         self._begin_file()
         try:
             while not stopped() and (duration_s is None or time.monotonic() - began_s < duration_s):
-                self._take(self._receive())
+                self._take(self._receive(_WAIT_S))
                 now_s = time.monotonic()
                 self.progress.duration_s = now_s - began_s
                 if now_s - self._committed_s >= CHUNK_S:
@@ -128,6 +131,7 @@ class Recorder:
                     if tell is not None:
                         tell(self.progress)
                 self._rotate(now_s)
+            self._catch_up()
         except SchemaError as error:
             self._note(str(error))
             self._end_file()
@@ -150,9 +154,18 @@ class Recorder:
         elif self._daemon.latest_status is not None:
             self._look_at(self._daemon.latest_status)
 
-    def _receive(self) -> list[Record]:
+    def _catch_up(self) -> None:
+        """Take what came before the end and has not been read."""
+        end_s = time.monotonic() + CATCH_UP_S
+        refused = -1
+        while refused != self.progress.refused and time.monotonic() < end_s:
+            refused = self.progress.refused
+            while (records := self._receive(0.0)) and time.monotonic() < end_s:
+                self._take(records)
+
+    def _receive(self, wait_s: float) -> list[Record]:
         try:
-            return self._daemon.receive(_WAIT_S)
+            return self._daemon.receive(wait_s)
         except SchemaError:
             raise
         except WireError as error:
