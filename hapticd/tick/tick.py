@@ -395,6 +395,7 @@ class ControlTick:
         for port in [port for port in self.leaving_ports if port.asleep]:
             self.past_ports.add_moving(port.books)
             self.leaving_ports.remove(port)
+            port.channels = []  # they know it, and in the loop no collector looks for circles
         self.leaving_ports += arrangement.gone
         self.couplings = arrangement.ports
         for port in self.couplings:

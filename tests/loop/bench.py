@@ -39,7 +39,7 @@ class Bench:
     def ticks(self, count: int) -> ControlTick:
         """The tick, so many of them later."""
         for _ in range(count):
-            force_n = self.tick.step(self.driver.read(), PERIOD_S)
+            force_n = self.tick.advance(self.driver.read(), PERIOD_S)
             if self.tick.guard.mode is not Mode.DISARMED:
                 self.driver.write(force_n)
             elif self.driver.state is DriverState.ENABLED:

@@ -346,6 +346,8 @@ class SpaceTick(ControlTick):
         if gone:
             for contact in gone:
                 self.books.close(contact)
+                if contact.moves:  # its port knows it, and in the loop no collector looks for circles
+                    del cast("RemoteContact", contact).port
             self._fading = [contact for contact in self._fading if contact not in gone]
             self._take_solids()
 
