@@ -99,7 +99,7 @@ class Follower:
             self._decay = exp(-HASTE_PER_S * dt_s)
         keep = self._decay * self._decay
         lost = (1.0 - self._decay) * (1.0 - self._decay)
-        ahead_s = min(dt_s, self.hold_s - self._ahead_s)
+        ahead_s = min(dt_s, max(0.0, self.hold_s - self._ahead_s))
         self._ahead_s += ahead_s
         goal_share = ahead_s / dt_s
         most = self.max_speed_m_per_s

@@ -148,6 +148,22 @@ def test_a_client_that_is_silent_leaves_the_object_where_it_is() -> None:
     assert rig.go(ticks=100) == force
 
 
+def test_an_object_stops_where_what_was_said_holds_no_longer_by_a_reload() -> None:
+    """It ran back, at its largest speed, to where it would have stopped by then."""
+    rig = Rig(PLANE, axes="xyz")
+    rig.say("floor", position_m=[0.0, 0.0, -0.5], velocity_m_per_s=[0.0, 0.0, 0.5])
+    rig.go([0.0, 0.0, 0.1], ticks=600)
+    rig.say("floor", position_m=rig["floor"].target_m, velocity_m_per_s=[0.0, 0.0, 0.5])
+    rig.go(ticks=60)
+    rig.switch(PLANE + "hold_s = 0.02\n")
+    way_m = [rig["floor"].target_m[2]]
+    for _ in range(100):
+        rig.go()
+        way_m.append(rig["floor"].target_m[2])
+    assert min(way_m) == way_m[0]
+    assert way_m[-1] - way_m[0] < 2e-3
+
+
 def test_stiffness_goes_over_by_a_ramp_and_is_the_clients_work() -> None:
     rig = Rig(BALL, axes="xyz")
     rig.go([0.0, 0.0, -0.021], ticks=3)
