@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import select
-import signal
 import socket
 import subprocess
 import sys
@@ -154,8 +153,7 @@ def end(process: subprocess.Popen[bytes]) -> bool:
 
 def kill(process: subprocess.Popen[bytes]) -> None:
     """End a loop at once, whatever it is doing."""
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(process.pid, signal.SIGKILL)
+    process.kill()  # which leaves alone what has ended: its number may be another's by now
     with contextlib.suppress(subprocess.TimeoutExpired):  # whatever can be done without it has to be done now
         process.wait(KILL_TIMEOUT_S)
 

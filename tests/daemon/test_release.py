@@ -70,3 +70,13 @@ def test_a_control_process_that_cannot_be_killed_does_not_keep_the_force_from_be
         assert release.release() == "the device is without force"
         subprocess.Popen.wait(stuck, 60.0)
         stuck.wait = partial(subprocess.Popen.wait, stuck)  # type: ignore[method-assign]  # it is gone
+
+
+def test_the_number_of_a_control_process_that_has_ended_is_sent_no_signal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may be another's by then, and the daemon may be root's."""
+    with subprocess.Popen(["/bin/true"]) as ended:
+        ended.wait()
+        sent: list[tuple[int, int]] = []
+        monkeypatch.setattr(os, "kill", lambda *whom: sent.append(whom))
+        kill(ended)
+        assert sent == []
