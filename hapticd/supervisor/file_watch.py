@@ -68,13 +68,15 @@ class FileWatcher:
     def _look(self) -> None:
         """Read the file, which is another one than last time and has come to rest."""
         try:
-            text = read(self._file)
+            text = read(self._file, files_only=True)
             if text == self._text or not text.strip():  # an empty file is one that is about to be written
                 return
             self._text = text
             self._found.append(parse(text, str(self._path)))
         except ConfigError as error:
             self._found.append(error)
+        except Exception as error:  # noqa: BLE001 - whatever a plug-in's checks raise, the next save is to be seen
+            self._found.append(ConfigError(f"{self._path}: cannot be checked: {type(error).__name__}: {error}"))
 
 
 def _identity(path: Path) -> tuple[int, ...]:

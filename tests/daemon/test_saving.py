@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from hapticd.config.loading import LoadedConfig
+from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import ConfigError
+from hapticd.supervisor import file_watch
 from hapticd.supervisor.file_watch import QUIET_S, FileWatcher
 from hapticd.tick.event import EventCode
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
@@ -151,6 +152,26 @@ def test_a_file_that_cannot_be_used_is_told_with_the_reason_and_the_next_save_is
         file.write_bytes(b"\xff")
         assert "UTF-8" in str(found(watcher))
         file.write_text(NEW)
+        assert law_in(watcher) == "tdpa"
+
+
+def test_a_file_whose_checks_fail_in_an_unknown_way_is_told_and_the_next_save_is_seen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As may be in a driver's check of its options: nothing that was saved later was seen."""
+    path = tmp_path / "lab.toml"
+    path.write_text(OLD)
+
+    def checked(text: str, name: str) -> LoadedConfig:
+        if text == BAD:
+            raise ZeroDivisionError("division by zero")
+        return parse(text, name)
+
+    monkeypatch.setattr(file_watch, "parse", checked)
+    with watched(path) as watcher:
+        path.write_text(BAD)
+        assert str(found(watcher)) == f"{path}: cannot be checked: ZeroDivisionError: division by zero"
+        path.write_text(NEW)
         assert law_in(watcher) == "tdpa"
 
 
