@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.cli.watch.screen import frame, one_line, si
+from hapticd.cli.watch.line import si
+from hapticd.cli.watch.screen import frame, one_line
 from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Cycle, Damping, Energy, Event, Position, Status
 from hapticd.telemetry.records import LateHistogram, late_ticks
@@ -73,6 +74,16 @@ def test_a_force_is_shown_as_limited_only_where_forces_are_let_through(armed: bo
     assert ("limited" in text) == armed
 
 
+def test_a_device_that_is_lost_is_said_first() -> None:
+    known = ScreenState()
+    known.take([Status(calibrated=False, device_lost_timestamp=1.0, warnings=("no device: is it plugged in?",))], 0.0)
+    lines = [line.plain for line in frame(known, "ipc:///x", 80, 24, 0.0)]
+    assert lines[0].rstrip().endswith("NO DEVICE")
+    assert lines[1].rstrip() == " ⚠ no device: is it plugged in?"
+    assert "calibrate" not in "".join(lines)
+    assert "no device" in one_line(known)
+
+
 def test_a_device_that_is_not_calibrated_says_what_it_waits_for() -> None:
     known = ScreenState()
     known.take([Status(calibrated=False, law="tdpa")], 0.0)
@@ -108,3 +119,23 @@ def test_one_line_names_each_axis() -> None:
 )
 def test_numbers_have_three_digits_and_a_prefix(value: float, text: str) -> None:
     assert si(value, "J") == text
+
+
+def test_eighty_columns_cut_nothing_that_somebody_waits_for() -> None:
+    """A rig that is late, with a fault, long warnings and a dozen counters."""
+    known = ScreenState()
+    metrics = {f"counter_of_frames_{number}": 0.0 for number in range(12)} | {"echo_us": 123456.789}
+    status = Status(
+        latched=True, fault_code=202, fault_text="1.01 m/s is above the limit of 1 m/s", calibrated=False,
+        warnings=("a link that is slow " * 4 + "ends here",), device_metrics=metrics, rate_hz=1000.0,
+        measured_rate_hz=999.9, late_histogram=(1000,) * 12, late_max_us=24500.0, overruns=123456, ring_drops=77,
+    )  # fmt: skip
+    known.take([status, Event(0.0, 1, 103, "configuration 98032d17ef83: law ring-damping -> tdpa")], 0.0)
+    lines = [line.plain for line in frame(known, "ipc:///x", 80, 40, 0.0)]
+    text = " ".join(" ".join(lines).split())
+    assert "stopped by a fault 202: 1.01 m/s is above the limit of 1 m/s; then hapticd clear" in text
+    assert "clear its workspace, then hapticd calibrate (and 1 more: hapticd status)" in text
+    assert "skipped 123456 lost 77 " in text
+    assert " device echo_us 123457 counter" in text
+    assert text.count("counter_of_frames_") + int(text.split(" more ")[0].split("+")[-1]) == 12
+    assert "law ring-damping -> tdpa" in " ".join(text.replace("│", " ").split())

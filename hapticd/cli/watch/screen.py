@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import textwrap
 import time
@@ -11,12 +10,14 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from hapticd.cli.watch.contacts import count_walls, of_objects
+from hapticd.cli.watch.health import health_lines
+from hapticd.cli.watch.line import si
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, bars, plot
 from hapticd.cli.watch.ports import port_lines, port_words
 from hapticd.cli.watch.space import VIEW_ROWS, contact_lines, views
 from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Position, Status
-from hapticd.telemetry.records import LATE_EDGES_US, LATE_US, late_ticks
+from hapticd.telemetry.records import late_ticks
 
 SILENT_S = 2.5
 """After this silence [s] a daemon counts as gone: it says its status every second."""
@@ -26,7 +27,6 @@ _REQUESTED = "red"
 _QUIET = "bright_black"
 _NARROW = 64
 _CYCLES_WIDTH = 36
-_PREFIXES = ((1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _MOST_WALLS = 4
 
 
@@ -96,19 +96,8 @@ def one_line(known: ScreenState) -> str:
     return "  ".join(parts)
 
 
-def si(value: float, unit: str) -> str:
-    """Three digits with a prefix: 12.3 mJ."""
-    if value == 0.0:
-        return f"0 {unit}"
-    factor, prefix = next((one for one in _PREFIXES if abs(value) >= 0.9995 * one[0]), _PREFIXES[-1])
-    scaled = value / factor
-    digits = 2 if abs(scaled) < 9.995 else 1 if abs(scaled) < 99.95 else 0
-    return f"{scaled:.{digits}f} {prefix}{unit}"
-
-
 def _running(known: ScreenState, status: Status, endpoint: str, width: int, height: int, now_s: float) -> list[Text]:
-    above = [_header(status, known, width, now_s), *_warnings(status), _loop(known, status, width), *_device(status)]
-    above += _model(status, width)
+    above = [_header(status, known, width, now_s), *health_lines(status, known.lost, width)]
     middle = [
         *_walls(known, status, width),
         *contact_lines(known.trail, status, of_objects(known.damping, status), width),
@@ -146,6 +135,8 @@ def _header(status: Status, known: ScreenState, width: int, now_s: float) -> Tex
 def _state(status: Status) -> tuple[str, str]:
     if status.latched:
         return "LATCHED", "bold white on red"
+    if status.device_lost_timestamp:
+        return "NO DEVICE", "bold white on red"
     if status.fallback:
         return "FALLBACK", "bold white on magenta"
     if status.releasing:
@@ -153,71 +144,6 @@ def _state(status: Status) -> tuple[str, str]:
     if status.armed:
         return "ARMED", "bold black on green"
     return "DISARMED", "bold black on yellow"
-
-
-def _warnings(status: Status) -> list[Text]:
-    """Standing warnings, at most two lines, and what a latched fault asks for."""
-    lines = list(status.warnings)
-    if not status.calibrated:
-        lines.insert(0, "not calibrated, so without force: clear its workspace, then  hapticd calibrate")
-    if status.latched:
-        lines.insert(0, "stopped by a fault: see events below, then  hapticd clear")
-    if len(lines) > 2:
-        lines = [lines[0], f"{lines[1]}  (and {len(lines) - 2} more: hapticd doctor)"]
-    return [Text(f" ⚠ {line}", style="yellow") for line in lines]
-
-
-def _loop(known: ScreenState, status: Status, width: int) -> Text:
-    line = _quiet(" loop ")
-    rate_hz = status.measured_rate_hz  # 0: not known yet
-    off = rate_hz and abs(rate_hz - status.rate_hz) > 0.01 * status.rate_hz
-    line.append(f"{rate_hz:.1f}" if rate_hz else "?", "bold yellow" if off else "bold").append(
-        f" of {status.rate_hz:g} Hz"
-    )
-    if status.late_histogram:
-        if width > _NARROW:
-            line.append("  late ", _QUIET).append_text(_late_bars(status))
-            line.append(" max ", _QUIET).append(si(status.late_max_us * 1e-6, "s"))
-        line.append("  late ticks ", _QUIET).append_text(_count(late_ticks(status.late_histogram), "yellow"))
-    line.append("  skipped ", _QUIET).append_text(_count(status.overruns, "yellow"))
-    lost = status.ring_drops + known.lost
-    if lost:
-        line.append("  lost ", _QUIET).append_text(_count(lost, "red"))
-    extra = _quiet("  busy max ").append(si(status.busy_max_us * 1e-6, "s"), "default")
-    return line.append_text(extra) if line.cell_len + extra.cell_len <= width else line
-
-
-def _device(status: Status) -> list[Text]:
-    """What the driver counts, where it counts anything."""
-    if not status.device_metrics:
-        return []
-    line = _quiet(" device")
-    for name, value in status.device_metrics.items():
-        line.append(f"  {name} ", _QUIET).append(f"{value:.10g}")
-    return [line]
-
-
-def _model(status: Status, width: int) -> list[Text]:
-    """The device model, where an accuracy was asked for."""
-    return [_quiet(f" {line}") for line in textwrap.wrap(status.accuracy, max(20, width - 2))]
-
-
-def _late_bars(status: Status) -> Text:
-    """Ticks by lateness, 10 us to 10 ms, counts on a logarithmic scale; red is a period of 1 kHz and more."""
-    heights = [math.log10(1.0 + count) for count in status.late_histogram]
-    text = Text("")
-    for index, bar in enumerate(bars(heights)):
-        lower_us = LATE_EDGES_US[index - 1] if index else 0
-        text.append(
-            bar if bar != " " else "·", "green" if lower_us < LATE_US else "yellow" if lower_us < 1280 else "red"
-        )
-        if bar == " ":
-            text.stylize(_QUIET, len(text) - 1)
-    return text
-
-
-def _count(count: int, alarm: str) -> Text:
-    return Text(f"{count}", style=f"bold {alarm}" if count else "default")
 
 
 def _plots(known: ScreenState, status: Status, width: int, height: int) -> list[Text]:
@@ -329,10 +255,10 @@ def _energy(known: ScreenState, width: int) -> Text:
 
 def _logs(known: ScreenState, width: int, rows: int) -> list[Text]:
     if width < _NARROW:
-        return _box("events", Text(""), _event_rows(known, rows), width)
+        return _box("events", Text(""), _event_rows(known, rows, width - 4), width)
     left = _CYCLES_WIDTH
     cycles = _box("cycles", Text(""), _cycle_rows(known, rows), left)
-    return _side_by_side(cycles, _box("events", Text(""), _event_rows(known, rows), width - left))
+    return _side_by_side(cycles, _box("events", Text(""), _event_rows(known, rows, width - left - 4), width - left))
 
 
 def _cycle_rows(known: ScreenState, rows: int) -> list[Text]:
@@ -344,14 +270,17 @@ def _cycle_rows(known: ScreenState, rows: int) -> list[Text]:
     return (lines + [Text("")] * rows)[:rows]
 
 
-def _event_rows(known: ScreenState, rows: int) -> list[Text]:
-    lines = []
+def _event_rows(known: ScreenState, rows: int, width: int) -> list[Text]:
+    """The latest events, each in as many lines as it takes."""
+    lines: list[Text] = []
     for event in list(known.events)[:rows]:
         sign, style = (
             ("✗", "bold red") if 200 <= event.code < 300 else ("⚠", "yellow") if event.code >= 300 else ("·", "")
         )
-        clock = time.strftime("%H:%M:%S", time.localtime(event.timestamp))
-        lines.append(_quiet(f"{clock} ").append(f"{sign} {event.text}", style))
+        clock = time.strftime("%H:%M:%S ", time.localtime(event.timestamp))
+        first, *others = textwrap.wrap(event.text, max(8, width - len(clock) - 2)) or [""]
+        lines.append(_quiet(clock).append(f"{sign} {first}", style))
+        lines += [Text(" " * (len(clock) + 2) + part, style) for part in others]
     if not lines:
         lines = [Text("none since this view was opened", style=_QUIET)]
     return (lines + [Text("")] * rows)[:rows]

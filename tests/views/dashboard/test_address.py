@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
+from pathlib import Path
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
@@ -12,6 +14,7 @@ from websockets.typing import Origin
 
 from hapticd.errors import ClientError
 from hapticd_views.address import Address
+from hapticd_views.commands.dashboard import PORT
 from hapticd_views.dashboard.server import Dashboard
 from hapticd_views.dashboard.target import Target
 from tests.ports import free_port
@@ -73,3 +76,11 @@ def test_off_loopback_watching_takes_the_token() -> None:
     assert "4401" in without
     assert "4401" in wrong
     assert json.loads(right)["hello"]["may_command"] is True
+
+
+def test_the_page_takes_no_port_that_the_pages_give_to_a_daemon_or_its_metrics() -> None:
+    root = Path(__file__).parents[3]
+    others = "".join((root / page).read_text() for page in ("config/hapticd.toml", "docs/remote.md", "docs/metrics.md"))
+    named = {int(port) for port in re.findall(r":(\d{4,5})\b", others)}
+    assert {9872, 9874, 9876} <= named
+    assert PORT not in named

@@ -13,7 +13,7 @@ import typer
 from hapticd.errors import ClientError
 from hapticd.paths import DEFAULT_INSTANCE
 
-PORT = 9874
+PORT = 9877
 """Where the page is unless another port is named."""
 
 
@@ -46,7 +46,7 @@ def dashboard(
     Prints the page's address, with a token behind the # that lets it command; the address without it only watches.
     Waits for a daemon, and finds it again after a restart. Ends with Ctrl-C, which changes nothing at the device.
 
-    Example: hapticd dashboard --instance left --port 9875
+    Example: hapticd dashboard --instance left --port 9878
     """
     if importlib.util.find_spec("websockets") is None:
         raise ClientError("hapticd dashboard needs its extra: pip install 'hapticd[dashboard]'")
