@@ -46,7 +46,7 @@ class Client:
         missing: ticks that did not arrive, by topic.
 
     Raises:
-        ClientError: no such topic, or ZeroMQ cannot use the endpoint.
+        ClientError: no such topic, ZeroMQ cannot use the endpoint, or it is used after `close`.
         ConfigError: the key file cannot be used.
     """
 
@@ -63,6 +63,8 @@ class Client:
         self.endpoint = endpoint or telemetry_endpoint(instance)
         self.latest_status: Status | None = None
         self.missing: dict[Topic, int] = dict.fromkeys(_EVERY_TICK, 0)
+        if isinstance(topics, str | type):
+            raise ClientError("topics: a list, such as topics=[Position]")
         self._topics = frozenset(_topic(topic) for topic in topics)
         self._timeout_s = timeout_s
         self._ahead: deque[Record] = deque()  # arrived with what was asked for, and not yet taken
@@ -179,6 +181,8 @@ class Client:
 
     def _message(self, deadline_s: float) -> list[Record] | None:
         """The records of the next message, which may have none; None when no message came in time."""
+        if self._socket.closed:
+            raise ClientError(f"{self.endpoint}: this connection is closed; connect again")
         left_s = deadline_s - time.monotonic()
         if not self._connection.wait(None if left_s == math.inf else left_s):
             return None

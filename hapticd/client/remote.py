@@ -111,7 +111,7 @@ class RemotePort:
         seq: number of the last message sent, 0 before the first.
 
     Raises:
-        ClientError: the scene has no such name, or an endpoint cannot be used.
+        ClientError: the scene has no such name, an endpoint cannot be used, or it is used after `close`.
         RefusedKeyError: the daemon does not list this key.
         SchemaError: the daemon speaks another version of the protocol.
         SilenceError: nothing answers.
@@ -233,6 +233,7 @@ class RemotePort:
             RefusedError: the daemon has refused what was sent.
             SilenceError: there is no state.
         """
+        self._need_open()
         if self._newest is None:
             self.state()
         elif self._from_state.wait(0.0):
@@ -251,6 +252,7 @@ class RemotePort:
 
     def release(self) -> None:
         """Let go: the daemon ramps its force out, and another client may have it."""
+        self._need_open()
         self._said = {}
         self._sending.send(msgpack.packb({"name": self.name, "release": True}), zmq.NOBLOCK)
 
@@ -299,8 +301,13 @@ class RemotePort:
             message["state_seq"] = self._newest.seq
         self._sending.send(msgpack.packb(message), zmq.NOBLOCK)
 
+    def _need_open(self) -> None:
+        if self._sending.closed:
+            raise ClientError(f"{self.name}: was let go and is closed; open it again with daemon.remote({self.name!r})")
+
     def _look(self) -> None:
         """See whether the daemon has refused something."""
+        self._need_open()
         if self._to_scene.wait(0.0):
             answer = msgpack.unpackb(self._sending.recv())
             if not answer["ok"]:

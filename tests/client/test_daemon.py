@@ -121,6 +121,8 @@ def test_closing_changes_nothing_at_the_device_and_stop_ends_the_daemon(daemon: 
         assert daemon.wait_exit() == 0
         with pytest.raises(InstanceError, match="hapticd run"):
             client.arm()
+    with pytest.raises(ClientError, match="closed; connect again"):
+        client.receive()
 
 
 def test_a_law_that_failed_is_cleared_before_the_device_is_armed(
@@ -199,5 +201,7 @@ def test_elsewhere_a_listed_key_watches_and_commands(tmp_path: Path, monkeypatch
 
 
 def test_a_daemon_elsewhere_is_never_mixed_up_with_the_one_here() -> None:
+    with pytest.raises(ClientError, match=r"topics=\[Position\]"):
+        connect(topics=Position)  # type: ignore[arg-type]  # a list is what it takes
     with pytest.raises(ClientError, match="name the same daemon's telemetry endpoint as well"):
         connect(control="tcp://lab.example:9873")

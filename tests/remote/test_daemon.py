@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import zmq
 
-from hapticd.client import RefusedError, RemotePort
+from hapticd.client import ClientError, RefusedError, RemotePort
 from hapticd.loop.memory import SKIPPED
 from hapticd.remote.state_map import ports_of
 from hapticd.tick.event import EventCode
@@ -81,6 +81,10 @@ def test_a_target_is_followed_and_the_client_learns_from_which_tick_on(tool: Rem
     tool.change(stiffness_n_per_m=100.0)
     sent = tool.seq
     wait_until(lambda: (port := tool.state().port) is not None and port.seq >= sent, "the change to be in force")
+    tool.close()
+    for use in (tool.state, tool.mean_force_n, tool.release, lambda: tool.move([0.0])):
+        with pytest.raises(ClientError, match="open it again"):
+            use()
 
 
 def test_the_mean_force_is_that_of_the_ticks_in_between_whatever_was_lost(daemon: Daemon, tool: RemotePort) -> None:
