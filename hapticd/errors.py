@@ -5,15 +5,20 @@ HapticdError                     one line for the user; `exit_code` for the shel
 ├── PluginError                  a driver or law that is unknown or cannot be loaded (exit 2)
 ├── RealtimeError                real-time rights were required and are missing
 ├── InstanceError                another daemon holds the instance, the device or an endpoint
-└── DriverError                  something about the device
-    ├── DeviceNotFoundError      nothing of this kind is plugged in
-    ├── DevicePermissionError    it is there, but this user may not open it
-    ├── DeviceBusyError          another process holds it
-    ├── DeviceDisconnectedError  it was there and is gone
-    ├── DeviceTimeoutError       it did not answer in time
-    ├── DeviceProtocolError      it answered something that makes no sense
-    ├── DeviceFaultError         it reports a fault of its own
-    └── DriverStateError         a call that the life cycle or the limits do not allow
+├── DriverError                  something about the device
+│   ├── DeviceNotFoundError      nothing of this kind is plugged in
+│   ├── DevicePermissionError    it is there, but this user may not open it
+│   ├── DeviceBusyError          another process holds it
+│   ├── DeviceDisconnectedError  it was there and is gone
+│   ├── DeviceTimeoutError       it did not answer in time
+│   ├── DeviceProtocolError      it answered something that makes no sense
+│   ├── DeviceFaultError         it reports a fault of its own
+│   └── DriverStateError         a call that the life cycle or the limits do not allow
+└── ClientError                  something about a daemon that a program listens to
+    ├── EndpointError            an address that none can have (exit 2)
+    ├── SilenceError             nothing arrived in time
+    ├── SchemaError              the daemon speaks another version of the contract
+    └── WireError                a message that is not what the contract says
 """
 
 from __future__ import annotations
@@ -91,6 +96,12 @@ class DriverStateError(DriverError):
 
 class ClientError(HapticdError):
     """Base of what can go wrong for a subscriber."""
+
+
+class EndpointError(ClientError):
+    """An endpoint that ZeroMQ cannot use."""
+
+    exit_code = 2
 
 
 class SilenceError(ClientError):

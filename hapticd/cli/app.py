@@ -12,7 +12,7 @@ from typing import Final
 
 import typer
 
-from hapticd.cli.group import Overview
+from hapticd.cli.group import EXIT_MISUSED, Overview
 from hapticd.version import __version__
 
 COMMANDS: Final = {
@@ -46,8 +46,6 @@ The module has a function of the command's name, or `app` when the command has c
 """
 
 GROUP = "hapticd.commands"
-
-EXIT_MISUSED = 2
 
 
 def application(wanted: str | None = None) -> typer.Typer:

@@ -10,9 +10,18 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+EXIT_MISUSED = 2
+
 
 class Overview(TyperGroup):
     """A group whose help has of each command the whole first sentence, in as many lines as that takes."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Show the overview to those who name no command."""
+        if not args and not self.invoke_without_command and not ctx.resilient_parsing:
+            typer.echo(ctx.get_help(), err=True)
+            raise typer.Exit(EXIT_MISUSED)
+        return super().parse_args(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a name and a sentence for each command."""
@@ -41,15 +50,10 @@ def lazy_group(commands: Mapping[str, tuple[str, str]], **settings: Any) -> type
             return name, typer.main.get_command(one), rest
 
     app = typer.Typer(cls=Group, rich_markup_mode=None, **settings)
-    app.callback(invoke_without_command=True)(_overview)
+    app.callback()(_listed)
     for name, (_, summary) in commands.items():
         app.command(name, help=summary)(_listed)
     return app
-
-
-def _overview(context: typer.Context) -> None:
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
 
 
 def _listed() -> None:

@@ -17,7 +17,7 @@ from hapticd.client.connection import Client
 from hapticd.client.daemon import DaemonClient, connect
 from hapticd.client.decode import decode
 from hapticd.client.remote import DrivenState, RemotePort, RemoteState
-from hapticd.errors import ClientError, InstanceError, SchemaError, SilenceError, WireError
+from hapticd.errors import ClientError, EndpointError, InstanceError, SchemaError, SilenceError, WireError
 from hapticd.keys.client import RefusedKeyError
 from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Gap, Input, Position, Record, Status, Timing, Touch
 from hapticd.tick.event import EventCode
@@ -29,6 +29,7 @@ __all__ = [
     "DaemonClient",
     "Damping",
     "DrivenState",
+    "EndpointError",
     "Energy",
     "Event",
     "EventCode",

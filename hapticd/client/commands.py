@@ -9,7 +9,7 @@ from typing import Any
 import msgpack
 import zmq
 
-from hapticd.errors import HapticdError, InstanceError, SilenceError
+from hapticd.errors import EndpointError, HapticdError, InstanceError, SilenceError
 from hapticd.keys.client import ENVIRONMENT, CurveClient, RefusedKeyError, client_keys
 from hapticd.paths import CONTROL, DEFAULT_INSTANCE, alive, locate
 
@@ -64,6 +64,7 @@ def command(
 
     Raises:
         ConfigError: the key file cannot be used.
+        EndpointError: ZeroMQ cannot use the endpoint.
         InstanceError: no daemon answers there, or two daemons of this name run.
         RefusedKeyError: commands over TCP take a key that the daemon lists.
         RefusedError: it answers that it will not.
@@ -92,7 +93,7 @@ def command(
         answer = talk.ask(request)
     except zmq.ZMQError as error:
         why = zmq.strerror(error.errno or 0)
-        raise InstanceError(f"{endpoint}: {why}; an endpoint is tcp://HOST:PORT or ipc://PATH") from error
+        raise EndpointError(f"{endpoint}: {why}; an endpoint is tcp://HOST:PORT or ipc://PATH") from error
     except SilenceError as error:
         if connect is None or connection.connected:
             text = f"{endpoint}: a daemon runs there and does not answer; what it does is in its log"

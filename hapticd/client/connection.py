@@ -12,7 +12,7 @@ from typing import Any, Self, TypeVar, overload
 import zmq
 
 from hapticd.client.decode import decode
-from hapticd.errors import ClientError, SchemaError, SilenceError, WireError
+from hapticd.errors import ClientError, EndpointError, SchemaError, SilenceError, WireError
 from hapticd.keys.client import CurveClient, client_keys
 from hapticd.paths import DEFAULT_INSTANCE, telemetry_endpoint
 from hapticd.telemetry.records import Event, Gap, Record, Sent, Status
@@ -82,7 +82,7 @@ class Client:
             self._connection.connect()
         except zmq.ZMQError as error:
             self.close()
-            raise ClientError(
+            raise EndpointError(
                 f"{self.endpoint}: {error.strerror}; an endpoint is ipc://PATH or tcp://HOST:PORT"
             ) from error
 

@@ -22,7 +22,7 @@ import msgpack
 import zmq
 
 from hapticd.client.commands import TIMEOUT_S, RefusedError
-from hapticd.errors import ClientError, SchemaError, SilenceError
+from hapticd.errors import ClientError, EndpointError, SchemaError, SilenceError
 from hapticd.keys.client import ENVIRONMENT, CurveClient, RefusedKeyError, client_keys
 
 SCHEMA = 1
@@ -142,7 +142,7 @@ class RemotePort:
             hello = self._hello()
         except zmq.ZMQError as error:
             self._close()
-            raise ClientError(f"{scene}: {error.strerror}; an endpoint is ipc://PATH or tcp://HOST:PORT") from error
+            raise EndpointError(f"{scene}: {error.strerror}; an endpoint is ipc://PATH or tcp://HOST:PORT") from error
         except BaseException:
             self._close()
             raise

@@ -52,9 +52,11 @@ def test_version_and_help_are_answers() -> None:
     assert "Put laws to the test" in done.stdout, "commands of the entry-point group are listed"
 
 
-def test_no_command_is_a_misuse_that_shows_the_overview() -> None:
-    done = hapticd()
+@pytest.mark.parametrize("group", [(), ("fault",), ("gateway",)])
+def test_no_command_is_a_misuse_that_shows_the_overview(group: tuple[str, ...]) -> None:
+    done = hapticd(*group)
     assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(" ".join(["Usage: hapticd", *group]))
     assert "Commands:" in done.stderr
 
 

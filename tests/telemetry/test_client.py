@@ -21,6 +21,7 @@ from hapticd.client import (
     ClientError,
     Cycle,
     Damping,
+    EndpointError,
     Energy,
     Event,
     Gap,
@@ -315,8 +316,9 @@ def test_any_msgpack_is_records_or_an_error_in_one_line(topic: bytes, payload: A
 def test_misuse_is_told_before_anything_is_connected() -> None:
     with pytest.raises(ClientError, match="topic 'forces': not one of position, energy"):
         Client("ipc:///nowhere", topics=["forces"])
-    with pytest.raises(ClientError, match=r"an endpoint is ipc://PATH or tcp://HOST:PORT"):
+    with pytest.raises(EndpointError, match=r"an endpoint is ipc://PATH or tcp://HOST:PORT"):
         Client("nonsense")
+    assert EndpointError.exit_code == 2
 
 
 def test_what_a_device_does_not_have_is_not_in_its_input() -> None:

@@ -144,7 +144,7 @@ def _csv(path: Path) -> Columns:
             rows = file.read()
         numbers = np.loadtxt(rows.splitlines(), delimiter=",", ndmin=2) if rows.strip() else np.empty((0, len(names)))
     except OSError as error:
-        raise HapticdError(f"{path}: cannot be read: {error.strerror}") from None
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError as error:
         raise HapticdError(f"{path}: is no table of numbers: {error}") from None
     if numbers.shape[1] != len(names):
@@ -157,6 +157,6 @@ def _npz(path: Path) -> Columns:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             return {name: found[name] for name in found.files}
     except OSError as error:
-        raise HapticdError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
         raise HapticdError(f"{path}: is no .npz file of numbers: {error}") from None

@@ -16,7 +16,7 @@ from hapticd.paths import DEFAULT_INSTANCE
 if TYPE_CHECKING:
     from hapticd_views.gateway.follower import Device
 
-app = typer.Typer(cls=Overview, rich_markup_mode=None, no_args_is_help=True)
+app = typer.Typer(cls=Overview, rich_markup_mode=None)
 
 HOST = "127.0.0.1"
 PORT = 10001

@@ -16,7 +16,7 @@ from mcap.exceptions import InvalidMagic, McapError
 from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from hapticd.errors import HapticdError
+from hapticd.errors import ConfigError, HapticdError
 
 _LARGEST_RECORD = 1 << 28
 _BROKEN = (McapError, EOFError, struct.error, ValueError, zstandard.ZstdError, MemoryError, OverflowError, RuntimeError)
@@ -90,7 +90,7 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
     try:
         file = path.open("rb")
     except OSError as error:
-        raise HapticdError(f"{path}: cannot be read: {error.strerror}") from error
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     with file:
         yield file
 
