@@ -105,6 +105,8 @@ def read(path: Path) -> FaultRecord:
         if ticks["format"] != layout.format:
             raise HapticdError(f"{path}: its ticks are laid out as hapticd {header['version']} does; read it with that")
         rows = memoryview(zlib.decompress(packed))
+        if len(rows) % layout.size:
+            raise HapticdError(f"{path}: damaged: the last of its ticks is not whole")
         found = [layout.unpack(rows[at : at + layout.size]) for at in range(0, len(rows), layout.size)]
     except (zlib.error, KeyError, TypeError, ValueError, IndexError, OverflowError, MemoryError) as error:
         raise HapticdError(f"{path}: damaged: {error or type(error).__name__}") from error

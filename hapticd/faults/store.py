@@ -67,6 +67,7 @@ class FaultStore:
             raise
         for stale in self.directory.glob(f"*{_UNFINISHED}"):  # of a daemon that was killed while it wrote
             stale.unlink(missing_ok=True)
-        for old in self.paths()[keep:]:
+        # A clock that was set back names this one as the oldest, and it is the one that is wanted.
+        for old in [other for other in self.paths() if other != path][max(0, keep - 1) :]:
             old.unlink(missing_ok=True)
         return path

@@ -106,6 +106,7 @@ def test_a_csv_has_every_field_of_every_tick_and_wall(tmp_path: Path) -> None:
         content().replace(b'"timestamp"', b'"timestomp"'),
         content().replace(b'"axes": 2', b'"axes": 2000000000000'),
         content()[:-20],
+        encode(header(), LAYOUT, iter([row(0, 1.0) + row(1, 1.0)[:9]])),
         content().replace(b"<qq", b"<qQ"),
         b"\xff" * 500,
     ],
@@ -138,6 +139,15 @@ def test_the_oldest_record_makes_room_and_no_half_record_stays(tmp_path: Path) -
     (store.directory / "20010909T014640.000Z-204.part").touch()
     store.write(1e9 + 9, 204, content(), keep=2)
     assert {path.suffix for path in store.directory.iterdir()} == {".fault"}
+
+
+def test_a_record_is_kept_though_the_clock_was_set_back(tmp_path: Path) -> None:
+    """As on a computer without a battery for its clock, which starts in 1970 until the network has told the time."""
+    store = FaultStore(tmp_path)
+    for second in range(2):
+        store.write(1e9 + second, 204, content(), keep=2)
+    written = store.write(60.0, 204, content(), keep=2)
+    assert [path.name for path in store.paths()] == ["20010909T014641.000Z-204.fault", written.name]
 
 
 def extend(shared: SharedMemory, count: int, first_seq: int) -> None:
