@@ -19,6 +19,8 @@ def effective_toml(loaded: LoadedConfig) -> str:
             table["options"] = _table(loaded.options)
         elif name == "controller":
             table["params"] = _table(loaded.params)
+        elif name == "remote":
+            table["params"] = _table(loaded.port_params)
         document.add(name, table)
     return tomlkit.dumps(document)
 

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig
+from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig, RemoteLawTable
 from hapticd.config.problems import shown_value
 from hapticd.errors import ConfigError
 
@@ -17,6 +17,7 @@ _KEY = re.compile(r"[A-Za-z0-9_-]+(\[\d+\]|\.[A-Za-z0-9_-]+)*")
 _PLUGINS = {
     "device.driver": ("options", DeviceConfig().driver),
     "controller.law": ("params", ControllerConfig().law),
+    "remote.law": ("params", RemoteLawTable().law),
 }
 """Keys that name a plug-in, with the table that belongs to it and its default."""
 
@@ -55,7 +56,7 @@ def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
     Args:
         data: a configuration.
         key: where, such as `scene.walls[0].stiffness_n_per_m`.
-        value: what; a number of numpy is taken as its own.
+        value: what; a number or an array of numpy is taken as its own.
         name: what to call the configuration in errors.
 
     Raises:
@@ -68,7 +69,7 @@ def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
     steps: list[str | int] = [
         int(step[1:-1]) if step.startswith("[") else step for step in re.findall(r"\[\d+\]|[A-Za-z0-9_-]+", key)
     ]
-    given = value.item() if hasattr(value, "item") else value
+    given = value.tolist() if hasattr(value, "tolist") else value
     try:
         tomlkit.item(given)
     except ValueError:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 import tomlkit
@@ -86,13 +87,14 @@ def test_without_a_configuration_the_machines_own_is_used(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("file", sorted(directory("config").glob("*.toml")), ids=lambda file: file.stem)
 def test_the_effective_configuration_is_the_same_configuration(file: Path) -> None:
-    loaded = load(file)
+    loaded = load(file).with_values({"remote.params": {"base_s": 0.002}})
     again = parse(effective_toml(loaded), str(file))
-    assert (again.config.model_copy(update={"device": None, "controller": None})) == (
-        loaded.config.model_copy(update={"device": None, "controller": None})
-    )
-    assert (again.options, again.params) == (loaded.options, loaded.params)
-    assert (again.driver, again.law) == (loaded.driver, loaded.law)
+    plugins = {"device": None, "controller": None, "remote": None}
+    assert again.config.model_copy(update=plugins) == loaded.config.model_copy(update=plugins)
+    remote: dict[str, Any] = {"params": {}}
+    assert again.config.remote.model_copy(update=remote) == loaded.config.remote.model_copy(update=remote)
+    assert (again.options, again.params, again.port_params) == (loaded.options, loaded.params, loaded.port_params)
+    assert (again.driver, again.law, again.port_law) == (loaded.driver, loaded.law, loaded.port_law)
 
 
 def accepted_or_refused(name: str, read: Callable[[], object]) -> None:

@@ -51,16 +51,29 @@ def test_parameters_leave_with_their_law_and_come_after_it_in_any_order() -> Non
     assert LAB.with_values(given).params.model_dump()["damping_cap_n_s_per_m"] == 7.0
 
 
+def test_parameters_of_couplings_and_forces_leave_with_their_law_too() -> None:
+    lab = LAB.with_values({"remote.params.base_s": 0.002})
+    other = lab.with_values({"remote.law": "tdpa"})
+    assert other.port_params == other.port_law.Params()
+    assert lab.with_values({"remote.law": "late-cycle"}).port_params == lab.port_params
+
+
 def test_options_leave_with_their_driver() -> None:
     other = LAB.with_values({"device.driver": "serial-rig"})
     assert type(other.options) is other.driver.Options
     assert "mass_kg" not in other.options.model_dump()
 
 
-def test_numbers_of_numpy_are_numbers() -> None:
-    values = {"scene.walls[0].stiffness_n_per_m": np.float32(8000.0), "controller.params.window": np.int64(2)}
-    found = LAB.with_values(values)
+def test_numbers_and_vectors_of_numpy_are_numbers_and_vectors() -> None:
+    ball = {"name": "ball", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 800.0}
+    values = {
+        "scene.walls[0].stiffness_n_per_m": np.float32(8000.0),
+        "scene.objects": [ball],
+        "controller.params.window": np.int64(2),
+    }
+    found = LAB.with_values(values).with_values({"scene.objects[0].position_m": np.array([0.0, 0.01, -0.02])})
     assert found.config.scene.walls[0].stiffness_n_per_m == 8000.0
+    assert found.config.scene.objects[0].position_m == (0.0, 0.01, -0.02)
     assert found.params.model_dump()["window"] == 2
 
 
