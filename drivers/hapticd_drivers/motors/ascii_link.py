@@ -29,6 +29,7 @@ class Dialect:
         closing: what is sent before it is closed.
         line: a frame as a line, its end included.
         frame: a line without its end as a frame; None for one that is no frame and no damage either.
+        refusal: what stands alone, without an end, for a line that the adapter has not taken; b"" where it ends as all.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Dialect:
     line: Callable[[int, bytes], bytes]
     frame: Callable[[bytes], Frame | None]
     """Raises ValueError for a line that makes no sense."""
+    refusal: bytes = b""
 
 
 class AsciiLink:
@@ -75,6 +77,8 @@ class AsciiLink:
         if not data:
             return []
         dialect = self._dialect
+        if dialect.refusal:
+            data = data.replace(dialect.refusal, dialect.refusal + dialect.end)  # or it would spoil the frame behind it
         *lines, rest = (self._came + data).split(dialect.end)
         if len(rest) > LONGEST_LINE:
             self.damaged += 1

@@ -3,7 +3,7 @@
 S8 <CR>  O <CR>  C <CR>             1 Mbit/s, open, close
 t00E4 0000003F <CR>                 identifier (3), length (1), data, without spaces; both ways
 <CR>, z <CR>                        the adapter has taken it
-<BEL>                               it has not
+<BEL>                               it has not; no <CR> follows
 """
 
 from __future__ import annotations
@@ -44,4 +44,4 @@ def frame(text: bytes) -> Frame | None:
 def dialect(bits_per_s: int) -> Dialect:
     """How an adapter writes frames on a bus of this speed [bit/s], one of `SPEEDS`."""
     opening = b"\rC\rS%d\rO\r" % SPEEDS[bits_per_s]
-    return Dialect(name="slcan", end=b"\r", opening=opening, closing=b"C\r", line=line, frame=frame)
+    return Dialect(name="slcan", end=b"\r", opening=opening, closing=b"C\r", line=line, frame=frame, refusal=b"\a")

@@ -71,6 +71,18 @@ def test_a_line_that_takes_no_more_drops_whole_frames_and_never_half_of_one(
     made.close()
 
 
+def test_a_refusal_of_slcan_is_counted_and_spoils_no_frame_behind_it(line: tuple[int, str]) -> None:
+    """No end of line comes behind the <BEL>, which is why Linux and python-can take it for one."""
+    far, path = line
+    made = AsciiLink("test", path, slcan.dialect(1_000_000))
+    os.write(far, b"\a\at00980000803F00000000\r\r\at0091")
+    assert made.receive() == [(0x009, bytes.fromhex("0000803F00000000"))]
+    os.write(far, b"FF\r")
+    assert made.receive() == [(0x009, b"\xff")]
+    assert made.damaged == 3
+    made.close()
+
+
 @pytest.mark.parametrize("dialect", DIALECTS, ids=lambda dialect: dialect.name)
 def test_an_adapter_that_is_gone_is_a_lost_device(line: tuple[int, str], dialect: Dialect) -> None:
     far, path = line
