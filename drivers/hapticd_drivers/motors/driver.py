@@ -29,6 +29,9 @@ SILENT_TICKS = 20
 By then its force has long gone: its own watchdog has stopped it, and the loop has stopped for a frozen device.
 """
 
+RESTARTED_S = 0.05
+"""A controller that says nothing for this time may have been switched off and on, and count from elsewhere [s]."""
+
 MOST_TURNS = 1e6
 """No shaft has turned so often."""
 
@@ -53,6 +56,7 @@ class MotorDriver(Driver[MotorOptionsT]):
         self._sample = Sample(len(self._drums))
         self._state_wait_s = PATIENCE * period_s
         self._most_silent = max(SILENT_TICKS, round(SILENCE_S / period_s))
+        self._restarted_ticks = round(RESTARTED_S / period_s)
         self._silent = 0
         self._sign_checked = options.sign_checked
         self._lock = threading.Lock()  # a calibration talks to the motors beside the loop
@@ -159,7 +163,7 @@ class MotorDriver(Driver[MotorOptionsT]):
                 problem = crew.problem()
                 if problem is not None:
                     raise problem
-            elif crew.REMEMBERS and not crew.absolute:
+            elif not crew.absolute and (crew.REMEMBERS or self._silent >= self._restarted_ticks):
                 self._forget_home()
             if fresh:
                 crew.note()
@@ -209,7 +213,7 @@ class MotorDriver(Driver[MotorOptionsT]):
         sample.calibrated = self._sign_checked and all(drum.homed for drum in self._drums)
 
     def _forget_home(self) -> None:
-        """A controller has been switched off and on, or has never been told where home is."""
+        """A controller has been switched off and on, as far as can be told, or was never told where home is."""
         for drum in self._drums:
             drum.homed = drum.options.homing == "absolute"
 

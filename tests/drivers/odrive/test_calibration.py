@@ -10,6 +10,7 @@ import pytest
 from hapticd.errors import DeviceFaultError, DriverStateError
 from hapticd_drivers.motors import crew
 from hapticd_drivers.odrive import crew as odrive_crew
+from hapticd_drivers.odrive.driver import Odrive
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
 from tests.drivers.odrive.lab import Lab, axes
@@ -48,9 +49,28 @@ def test_it_tries_the_watchdog_and_finds_the_stop(bench: Lab) -> None:
     assert driver.read().calibrated
     assert driver.read().position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=3e-4)
     driver.enable()
+    driver.disable()
+    lose_power(bench, driver)
+    assert not driver.read().calibrated
+    with pytest.raises(DriverStateError, match="not known where the handle is"):
+        driver.enable()
     driver.close()
     with bench.driver(axes=axes(1)) as again, pytest.raises(DriverStateError, match="not known where the handle is"):
         again.enable()  # another start of the daemon: it has to be calibrated anew
+
+
+def lose_power(bench: Lab, driver: Odrive) -> None:
+    """For a tenth of a second, in ticks that are not armed; then it counts from where its shaft is."""
+    bench.first.deaf = True
+    bench.first.restart()
+    bench.first.turns = 0.0
+    bench.bench.settle(driver)
+    driver.read()
+    driver._state_wait_s = 0.0
+    for _ in range(100):
+        driver.read()
+    driver._state_wait_s = PATIENCE_S
+    bench.first.deaf = False
 
 
 def test_an_odrive_without_the_watchdog_that_is_declared_does_not_pass(bench: Lab) -> None:
