@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 
-from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError
+from hapticd.errors import DeviceFaultError, DeviceProtocolError, DeviceTimeoutError, DriverError
 from hapticd_drivers.moteus import registers
 from hapticd_drivers.moteus.faults import stopped_text
 from hapticd_drivers.moteus.registers import (
@@ -155,12 +155,29 @@ class MoteusCrew(Crew):
 
     def set_home(self, turns: list[float | None]) -> None:
         """Have each count from its home, which it remembers until it is switched off."""
-        for index, (motor, home) in enumerate(zip(self._motors, turns, strict=True)):
+        motors = self._motors
+        before = [motor.turns for motor in motors]
+        after = list(before)
+
+        def say(index: int) -> None:
+            home = turns[index]
             if home is not None:
-                self._send(index, registers.here_is(motor.turns - home))
-        self._say_until(lambda index: self._send(index, registers.QUERY), lambda index: self._motors[index].heard)
+                after[index] = motors[index].turns - home
+                self._send(index, registers.here_is(after[index]))
+            self._send(index, registers.QUERY)
+
+        def taken(index: int) -> bool:
+            """Whether it counts anew; its home state may speak of an older home."""
+            now = motors[index].turns
+            return motors[index].heard and abs(now - after[index]) <= abs(now - before[index])
+
+        refusal = DeviceProtocolError(f"{self._name}: a controller on {self.link.where} has not taken its home")
+        try:
+            self._say_until(say, taken)
+        except DeviceTimeoutError as error:
+            raise refusal if all(motor.heard for motor in motors) else error from None
         if not self.absolute and None not in turns:
-            raise DeviceProtocolError(f"{self._name}: a controller on {self.link.where} has not taken its home")
+            raise refusal
 
     def prove_watchdog(self) -> None:
         """Command nothing while a torque of 0 holds; questions feed no watchdog."""

@@ -9,7 +9,7 @@ from typing import ClassVar, TypeVar
 
 from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverState
-from hapticd.errors import ConfigError, DeviceProtocolError, DeviceTimeoutError, DriverStateError
+from hapticd.errors import ConfigError, DeviceProtocolError, DeviceTimeoutError, DriverError, DriverStateError
 from hapticd.trace import DriverTrace
 from hapticd_drivers.motors.crew import Crew
 from hapticd_drivers.motors.drum import Drum
@@ -238,9 +238,12 @@ class MotorDriver(Driver[MotorOptionsT]):
                     self._calibrate_axis(mover, index)
             finally:
                 crew.disable()
-            crew.set_home(
-                [None if drum.options.homing == "absolute" else drum.turns(_home_m(drum)) for drum in self._drums]
-            )
+            homes = [None if drum.options.homing == "absolute" else drum.turns(_home_m(drum)) for drum in self._drums]
+            try:
+                crew.set_home(homes)
+            except DriverError:
+                self._forget_home()  # some may have taken theirs
+                raise
             if crew.absolute:
                 for drum in self._drums:
                     drum.put(0.0, _home_m(drum))

@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
-from hapticd.errors import DeviceFaultError, DriverStateError
+from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverStateError
 from hapticd_drivers.motors import crew
 from tests.drivers.moteus.lab import Lab, axes
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
+from tests.drivers.motors.wire import Frames
 
 BOUND_N = 0.5
 
@@ -30,6 +31,7 @@ def opened(bench: Lab, **keys: Any) -> Any:
     driver = bench.driver(
         axes=axes(1, **keys), sign_checked=False, calibration_speed_m_per_s=0.1, calibration_force_n=BOUND_N
     )
+    driver._state_wait_s = PATIENCE_S  # a busy computer is no fault
     driver.open()
     return driver
 
@@ -58,6 +60,45 @@ def test_it_finds_the_stop_and_the_controllers_remember_home(bench: Lab) -> None
     with pytest.raises(DriverStateError, match="not known where the handle is"):
         again.enable()
     again.close()
+
+
+def lose_homes(bench: Lab, monkeypatch: pytest.MonkeyPatch, most: int) -> list[bytes]:
+    """Lose this many of the frames that tell the controller its home; those that were lost so far."""
+    hear, lost = bench.first.hear, list[bytes]()
+
+    def hear_others(identifier: int, data: bytes) -> Frames:
+        if b"\x0d\xb1\x02" in data and len(lost) < most:  # SET_OUTPUT_EXACT
+            lost.append(data)
+            return []
+        answers: Frames = hear(identifier, data)
+        return answers
+
+    monkeypatch.setattr(bench.first, "hear", hear_others)
+    return lost
+
+
+def test_a_home_that_was_lost_on_the_way_is_told_again(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """That it has a home the controller says all the time: it has an older one."""
+    bench.first.home_state = 2
+    with bench.driver(axes=axes(1)) as driver:
+        motors = driver._opened()
+        lost = lose_homes(bench, monkeypatch, 1)
+        assert abs(motors.motors[0].turns) > 0.1
+        motors.set_home([motors.motors[0].turns])
+        assert len(lost) == 1
+        assert motors.motors[0].turns == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_home_that_is_not_taken_leaves_none(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    driver = opened(bench, homing="here")
+    driver.calibrate()
+    monkeypatch.setattr(crew, "GREETING_PATIENCE_S", 0.3)
+    lose_homes(bench, monkeypatch, 1000)
+    with pytest.raises(DeviceProtocolError, match="has not taken its home"):
+        driver.calibrate()
+    with pytest.raises(DriverStateError, match="not known where the handle is"):
+        driver.enable()
+    driver.close()
 
 
 def test_home_may_be_where_the_handle_is(bench: Lab) -> None:
