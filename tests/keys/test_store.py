@@ -70,6 +70,21 @@ def test_the_services_group_is_for_root_to_give(monkeypatch: pytest.MonkeyPatch)
     assert store._service_group() == -1
 
 
+@pytest.mark.parametrize("user", [0, 1000])
+def test_where_there_is_no_service_no_group_reads_its_keys(
+    user: int, keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unknown(name: str) -> None:
+        raise KeyError(name)
+
+    monkeypatch.setattr("grp.getgrnam", unknown)
+    monkeypatch.setattr(os, "geteuid", lambda: user)
+    keys.make()
+    keys.add("laptop", new_pair())
+    assert set(modes(keys.path).values()) == {0o700, 0o600}
+    assert {path.stat().st_gid for path in keys.path.rglob("*")} == {os.getegid()}
+
+
 def test_a_ring_says_who_may_watch_and_who_may_command(keys: KeyDirectory) -> None:
     laptop, wall = new_pair(), new_pair()
     keys.add("laptop", laptop)
