@@ -120,3 +120,17 @@ def test_a_mass_is_believed_at_the_end_of_a_cycle_from_twenty_samples_on(
     state.count, state.sum_uu, state.sum_uw = samples, 1.0, 2.0
     contact.goes(1)
     assert state.felt_mass_kg == pytest.approx(felt_kg)
+
+
+@pytest.mark.parametrize("way", [[-1] * 12, [1] * 12 + [-1] * 13], ids=["out", "in and out"])
+@pytest.mark.parametrize(
+    ("law", "params"), [(energy_cycle, {"cap": "none"}), (late_cycle, {"most_unfelt_n_s_per_m": 1e3})]
+)
+def test_a_cycle_that_travels_by_ten_counts_adds_to_any_damping_and_a_shorter_one_does_not(
+    law: ModuleType, params: dict[str, Any], way: list[int]
+) -> None:
+    """Whichever way it goes; a small one is as much noise as motion."""
+    for steps, adds in ((way, True), ([-1] * 9, False)):
+        contact = Contact(law, **params)
+        contact.state.damping_n_s_per_m = 200.0
+        assert (contact.goes(*steps, 1, 1)[-1] > 200.0) == adds
