@@ -21,7 +21,7 @@ from tests.firmware.tools import FIRMWARE, HERE, need, run
 
 ANSWER_S = 60.0  # a loaded machine is slow, a dead board is dead for ever
 
-Pace = Literal["real", "frames", "steps"]
+Pace = Literal["real", "frames", "patient", "steps"]
 Kind = Literal["uno", "hapkit"]
 KINDS: tuple[Kind, ...] = ("uno", "hapkit")
 
@@ -82,7 +82,8 @@ class Board:
         port: a path for the serial port; exists while the rig is plugged in.
         pace: how simulated time passes. "real": with the clock, slower on a machine that is late. "frames": 1 ms for
             each frame that the host sends, and with the clock after 0.3 s without any, so that a driver's tick and a
-            millisecond of the rig are the same whatever the load. "steps": only by `run`.
+            millisecond of the rig are the same whatever the load. "patient": the same, after 30 s, for a host that never
+            falls silent but may wait for its processor. "steps": only by `run`.
     """
 
     def __init__(self, built: Built, port: Path, pace: Pace = "real") -> None:

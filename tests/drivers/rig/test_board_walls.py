@@ -75,7 +75,7 @@ def test_the_default_law_holds_a_wall_that_shakes_without_one(
     monkeypatch.setattr(conversation, "PATIENCE_S", PATIENCE_S)
     monkeypatch.setattr(conversation, "URGENT_PATIENCE_S", PATIENCE_S)
     built: Built = request.getfixturevalue(parts)
-    with Board(built, tmp_path / "port", pace="frames") as board:
+    with Board(built, tmp_path / "port", pace="patient") as board:
         found_m = places_m(board, law, monkeypatch)
         swing_m = max(found_m) - min(found_m)
         if still:

@@ -41,7 +41,7 @@ class TestHapkit(DriverContract):
     def driver(self, hapkit_parts: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[AnyDriver]:
         monkeypatch.setattr(conversation, "PATIENCE_S", PATIENCE_S)
         monkeypatch.setattr(conversation, "URGENT_PATIENCE_S", PATIENCE_S)
-        with Board(hapkit_parts, tmp_path / "port", pace="frames") as board:
+        with Board(hapkit_parts, tmp_path / "port", pace="patient") as board:
             self.board = board
             options = SerialRigOptions(port=str(board.port), sign_checked=True)
             with Counted(options, 0.001) as before:

@@ -7,6 +7,7 @@
  * PACE says how simulated time passes:
  *   real     with the clock, but never faster: a machine that is late makes the rig slow, it does not replay
  *   frames   1 ms for each frame from the host; after 0.3 s without one, with the clock
+ *   patient  the same, after 30 s without one
  *   steps    only by the command `run`
  * LINK is a symbolic link to the pty that is there while the rig is plugged in.
  *
@@ -30,10 +31,11 @@
 
 static const double FRAME_US = 1000.0;      /* what a frame is worth at the pace of frames */
 static const double PATIENCE_US = 300000.0; /* after which silence is no late host but a silent one */
+static const double LONGER_US = 30e6;       /* and where none falls silent on purpose */
 static const double BEHIND_US = 2000.0;     /* that real time may be ahead before the rig gives up following */
 static const double PART_US = 200.0;        /* between two looks at the line */
 
-enum pace { REAL, FRAMES, STEPS };
+enum pace { REAL, FRAMES, PATIENT, STEPS };
 
 static struct handle handle;
 static struct processor *processor;
@@ -204,7 +206,7 @@ static void wait_for_something(enum pace pace)
 
 int main(int argc, char **argv)
 {
-    static const char *const PACES[] = {[REAL] = "real", [FRAMES] = "frames", [STEPS] = "steps"};
+    static const char *const PACES[] = {[REAL] = "real", [FRAMES] = "frames", [PATIENT] = "patient", [STEPS] = "steps"};
     static const struct wiring *const WIRINGS[] = {&UNO, &HAPKIT};
     const struct wiring *wiring = NULL;
     int pace = -1;
@@ -215,7 +217,7 @@ int main(int argc, char **argv)
         pace = strcmp(argv[3], PACES[i]) == 0 ? i : pace;
     }
     if (pace < 0 || wiring == NULL) {
-        fprintf(stderr, "usage: board uno|hapkit FIRMWARE.elf real|frames|steps LINK\n");
+        fprintf(stderr, "usage: board uno|hapkit FIRMWARE.elf real|frames|patient|steps LINK\n");
         return 2;
     }
     prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -237,10 +239,10 @@ int main(int argc, char **argv)
         take();
         double real_us = now_us();
         double due_us = 0.0;
-        if (pace == REAL || real_us - heard_us > PATIENCE_US) {
+        if (pace == REAL || real_us - heard_us > (pace == PATIENT ? LONGER_US : PATIENCE_US)) {
             due_us = fmin(real_us - lived_us, BEHIND_US);
         }
-        if (pace == FRAMES) {
+        if (pace == FRAMES || pace == PATIENT) {
             due_us += (double)line_frames() * FRAME_US;
         }
         lived_us = real_us;
