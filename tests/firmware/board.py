@@ -82,7 +82,7 @@ class Board:
         port: a path for the serial port; exists while the rig is plugged in.
         pace: how simulated time passes. "real": with the clock, slower on a machine that is late. "frames": 1 ms for
             each frame that the host sends, and with the clock after 0.3 s without any, so that a driver's tick and a
-            millisecond of the rig are the same whatever the load. "patient": the same, after 30 s, for a host that never
+            millisecond of the rig are the same whatever the load. "patient": the same, after 30 s, for one that never
             falls silent but may wait for its processor. "steps": only by `run`.
     """
 
