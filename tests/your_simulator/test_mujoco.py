@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import sys
-from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -69,21 +68,23 @@ def test_the_example_runs_beside_a_daemon(rate_hz: int, duration_s: float) -> No
             env=environment, capture_output=True, text=True, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
-        ticks = _last(client, round(1e3 * duration_s))
+        ticks = _pushed(client)
     said = re.fullmatch(r"ball at x = (-?\d+) mm, drawer (\d+) mm in\n", done.stdout)
     assert said, done.stdout
     assert hum_m(np.array([tick.position_m for tick in ticks])) < STILL_M
     assert max(np.linalg.norm(tick.force_n) for tick in ticks) > 1.0
 
 
-def _last(client: Client, count: int) -> list[Position]:
-    """The newest ticks; before them the example may have been starting for long."""
+def _pushed(client: Client) -> list[Position]:
+    """The ticks until now from the first to the last with a force; the example may take long to start and to end."""
     with Client(client.endpoint, topics=[Position]) as other:
         now = other.wait_for(Position).seq
-    found: deque[Position] = deque(maxlen=count)
+    found: list[Position] = []
     while not found or found[-1].seq < now:
         found += [tick for tick in client.receive(1.0) if isinstance(tick, Position)]
-    return list(found)
+    pushed = [index for index, tick in enumerate(found) if any(tick.force_n)]
+    assert len(pushed) > 1000, "the hand has felt next to nothing"
+    return found[pushed[0] : pushed[-1] + 1]
 
 
 def test_the_page_shows_the_example_as_it_is() -> None:

@@ -32,7 +32,8 @@ BUSY = {
 }
 """What this computer brings about when it has no time for the loop or for the motors."""
 
-ATTEMPTS = 5
+ATTEMPTS = 15
+"""A computer whose processors others want as well disturbs most of them."""
 
 
 def config(device: str, stiffness_n_per_m: float, law: str = "") -> str:
