@@ -17,10 +17,12 @@ class Seen(NamedTuple):
     Attributes:
         x_m: position [m].
         impulse_n_s: what its port has pushed the device with, in all [N s].
+        span_s: from the state that it saw in its step before to this one; None: as long as its step [s].
     """
 
     x_m: float
     impulse_n_s: float
+    span_s: float | None = None
 
 
 class Client(ABC):
@@ -46,7 +48,8 @@ class Client(ABC):
 class Tool(Client):
     """A free body behind a coupling, which comes to lie on a table: the simulator of a peg, a probe, a hand.
 
-    It gets the mean force over its last step, as `Remote.mean_force_n` gives it.
+    It gets the mean force between the two states that it saw, as `Remote.mean_force_n` gives it: where the state is one
+    or two ticks old by chance, a force over the time of its own step would be wrong by as much.
 
     Args:
         mass_kg: of the body [kg].
@@ -60,17 +63,19 @@ class Tool(Client):
         self._mass_kg = mass_kg
         self._table_n_per_m = table_n_per_m
         self.table_n_s_per_m = 2.0 * (mass_kg * table_n_per_m) ** 0.5
-        self._before_n_s = 0.0
+        self._before_n_s = self._mean_n = 0.0
         self._x_m = self._v_m_per_s = 0.0
 
     def step(self, passed_s: float, seen: Seen, update: Update) -> None:
         """Move under the mean force."""
-        mean_n = (seen.impulse_n_s - self._before_n_s) / passed_s
-        self._before_n_s = seen.impulse_n_s
+        span_s = passed_s if seen.span_s is None else seen.span_s
+        if span_s > 0.0:
+            self._mean_n = (seen.impulse_n_s - self._before_n_s) / span_s
+            self._before_n_s = seen.impulse_n_s
         steps = max(1, round(passed_s / STEP_S))
         step_s = passed_s / steps
         for _ in range(steps):
-            force_n = -mean_n
+            force_n = -self._mean_n
             if self._x_m < 0.0:
                 force_n -= self._table_n_per_m * self._x_m + self.table_n_s_per_m * self._v_m_per_s
             self._v_m_per_s += force_n / self._mass_kg * step_s

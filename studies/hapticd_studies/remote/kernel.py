@@ -118,7 +118,8 @@ def run(
     weight = age_s = outside_s = impulse_n_s = 0.0
     at_m = speed_m_per_s = goal_m = goal_m_per_s = ahead_s = 0.0
     goal_n = now_n = 0.0
-    body_m = body_m_per_s = before_n_s = 0.0
+    body_m = body_m_per_s = before_n_s = mean_n = 0.0
+    last_saw = -1
     before_s = port.first_s
     x_m = last_m = plant.measured_m
     last_true_m = 0.0
@@ -241,8 +242,11 @@ def run(
             before_s = at_s[turn]
             device_m, device_n_s = known[sees[turn], 0], known[sees[turn], 1]
             if port.spring:
-                mean_n = (device_n_s - before_n_s) / passed_s
-                before_n_s = device_n_s
+                span_s = (sees[turn] - last_saw) * period_s
+                last_saw = sees[turn]
+                if span_s > 0.0:
+                    mean_n = (device_n_s - before_n_s) / span_s
+                    before_n_s = device_n_s
                 steps = max(1, round(passed_s / STEP_S))
                 step_s = passed_s / steps
                 for _ in range(steps):

@@ -165,6 +165,7 @@ def run(case: Case, law: LawSpec, take: Callable[[Rehearsal], object] | None = N
     turn = next(coming, None)
     before_s = -1.0 / case.network.rate_hz
     newest = -1
+    last_saw = -1
     known: list[Seen] = []
     true_m: list[float] = []
     peak_n = step_n = last_n = 0.0
@@ -173,8 +174,9 @@ def run(case: Case, law: LawSpec, take: Callable[[Rehearsal], object] | None = N
         now_s = (count + 1) * period_s
         known.append(Seen(rehearsal.tick.motion.position_m[0], port.impulse_n_s[0]))
         while turn is not None and turn.at_s < now_s:
-            seen = known[min(count, int(turn.sees_s / period_s))]
-            client.step(turn.at_s - before_s, seen, update)
+            saw = min(count, int(turn.sees_s / period_s))
+            client.step(turn.at_s - before_s, known[saw]._replace(span_s=(saw - last_saw) * period_s), update)
+            last_saw = saw
             update.seq += 1
             before_s = turn.at_s
             if turn.heard_s is not None:
