@@ -11,6 +11,10 @@ a client does and a wall does not:
     - a force learns fast: the second cycle in a row that generates adds twice. A spring learns slowly: two cycles are
       let pass after each that adds, and after it came into force, since the body behind it goes on swinging from
       before, and a device that is held too fast leaves the body to swing against it;
+    - slow swings of a spring, of more than 30 ms a cycle, add no more than the most that a base is. It is quick swings
+      that more damping stills: those of the device. Slow ones are the body's, by a late spring; the device takes most
+      from it at sqrt(k m) of the body, 20 to 80 N s/m. Beyond that it moves less the more it is damped, so that what a
+      swing gave over the little motion looks like too little damping, more each time;
     - each cycle that generates nothing takes a twentieth off, but not below what was too little before; a spring that
       comes into force anew begins anew;
     - damping comes in 10 ms, and the velocity is smoothed: 0.1 kN s/m on one count of the position is a kick, and so is
@@ -44,6 +48,7 @@ NEW_SPEED = 0.5  # share of the newest sample in the velocity that is damped
 EASE_S = 0.01  # in which a damping comes into force, to 63 %: at 1 m/s at once it is a jump of its whole force [s]
 AGAIN = 2.0  # times what is missing that a force's second cycle in a row adds: one swing of it takes half a second
 SPRING_WAITS = 2.0  # cycles of a spring that are let pass after a change: what swings there began before it
+SLOW_S = 0.03  # a cycle of a spring that lasts longer is of the body behind it, and not of the device [s]
 FLOOR_FALL = 0.1  # what was too little is forgotten so much slower than what was added beyond it
 
 
@@ -70,6 +75,7 @@ class State(CycleSums, FeltFields):
     floor_n_s_per_m: float  # was too little
     again: float  # times what is missing that the next cycle adds
     waits: float  # cycles that are let pass
+    cycle_s: float  # since the last cycle's end
     velocity_m_per_s: float  # smoothed
     was_in_contact: bool
     period_s: float  # dt, smoothed: one overrun is not another sampling rate
@@ -81,6 +87,7 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
     state.eased_n_s_per_m = state.damping_n_s_per_m
     _forget(state)
+    state.cycle_s = 0.0
     state.velocity_m_per_s = 0.0
     know_nothing(state, False)
     state.was_in_contact = False
@@ -100,6 +107,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
         state.highest_m = tick.x_m
         state.damping_n_s_per_m = 0.0
         _forget(state)
+        state.cycle_s = 0.0
         state.waits = SPRING_WAITS
     state.was_in_contact = tick.in_contact
 
@@ -130,6 +138,7 @@ def _count_energy(state: Any, tick: Any) -> None:
     port_n = state.last_port_n if state.forces_late else tick.applied_contact_n
     state.last_port_n = tick.applied_contact_n
     state.energy_j -= port_n * tick.moved_m
+    state.cycle_s += tick.dt_s
     if tick.in_contact:
         state.motion_m2_per_s += tick.velocity_m_per_s * tick.velocity_m_per_s * tick.dt_s
         state.lowest_m = min(state.lowest_m, tick.x_m)
@@ -147,20 +156,23 @@ def _end_cycle(state: Any, params: Any, tick: Any) -> None:
         if state.waits > 0.0:
             state.waits -= 1.0
         elif missing > 0.0:
-            _add(state, missing, tick.spring_n != 0.0)
+            _add(state, params, missing, tick.spring_n != 0.0)
         else:
             state.again = 1.0
             state.floor_n_s_per_m *= 1.0 - FLOOR_FALL * params.fall
             state.damping_n_s_per_m = max(state.floor_n_s_per_m, state.damping_n_s_per_m * (1.0 - params.fall))
     end(state, tick.x_m)
+    state.cycle_s = 0.0
     state.motion_m2_per_s -= motion
     state.candidate_motion_m2_per_s = 0.0
 
 
-def _add(state: Any, missing: float, spring: bool) -> None:
+def _add(state: Any, params: Any, missing: float, spring: bool) -> None:
     """What there was is too little."""
     state.floor_n_s_per_m = max(state.floor_n_s_per_m, state.damping_n_s_per_m)
     if spring:
+        if state.cycle_s > SLOW_S:
+            missing = min(missing, max(0.0, params.most_base_n_s_per_m - state.damping_n_s_per_m))
         state.damping_n_s_per_m += missing
         state.waits = SPRING_WAITS
     else:
