@@ -75,7 +75,7 @@ class State(CycleSums, FeltFields):
     floor_n_s_per_m: float  # was too little
     again: float  # times what is missing that the next cycle adds
     waits: float  # cycles that are let pass
-    cycle_s: float  # since the last cycle's end
+    cycle_s: float  # in force since the last cycle's end
     velocity_m_per_s: float  # smoothed
     was_in_contact: bool
     period_s: float  # dt, smoothed: one overrun is not another sampling rate
@@ -138,11 +138,14 @@ def _count_energy(state: Any, tick: Any) -> None:
     port_n = state.last_port_n if state.forces_late else tick.applied_contact_n
     state.last_port_n = tick.applied_contact_n
     state.energy_j -= port_n * tick.moved_m
-    state.cycle_s += tick.dt_s
     if tick.in_contact:
+        state.cycle_s += tick.dt_s
         state.motion_m2_per_s += tick.velocity_m_per_s * tick.velocity_m_per_s * tick.dt_s
-        state.lowest_m = min(state.lowest_m, tick.x_m)
-        state.highest_m = max(state.highest_m, tick.x_m)
+        x_m = tick.x_m
+        if x_m < state.lowest_m:
+            state.lowest_m = x_m
+        elif x_m > state.highest_m:
+            state.highest_m = x_m
 
 
 def _end_cycle(state: Any, params: Any, tick: Any) -> None:

@@ -46,12 +46,14 @@ class Port:
     def damping(self) -> float:
         return float(self.state.damping_n_s_per_m)
 
-    def swing(self, given_n_s_per_m: float, times: int = 1, stiffness_n_per_m: float = 0.0) -> list[float]:
+    def swing(
+        self, given_n_s_per_m: float, times: int = 1, stiffness_n_per_m: float = 0.0, half: int = 40
+    ) -> list[float]:
         """Swings on a spring of 3 kN/m that gives as a negative damper of so much would; each damping that followed."""
         found = []
         x_m = 0.0
-        for at in range(80 * times):
-            way_m = -1e-4 if 20 <= at % 80 < 60 else 1e-4
+        for at in range(2 * half * times):
+            way_m = -1e-4 if half <= 2 * (at % (2 * half)) < 3 * half else 1e-4
             x_m += way_m
             before = self.damping
             self.go(way_m, -3000.0 * x_m + given_n_s_per_m * way_m / DT_S, stiffness_n_per_m, x_m - 5e-6)
@@ -110,11 +112,19 @@ def test_what_a_force_has_given_in_a_half_swing_is_added_to_the_damping_and_twic
 def test_a_spring_lets_two_half_swings_pass_at_its_beginning_and_after_each_that_adds() -> None:
     port = Port()
     base = 0.015 * 300.0
-    assert port.swing(8.0, stiffness_n_per_m=300.0) == [pytest.approx(base)] * 2
-    dampings = [base, *port.swing(8.0, times=8, stiffness_n_per_m=300.0)]
+    assert port.swing(8.0, stiffness_n_per_m=300.0, half=20) == [pytest.approx(base)]
+    dampings = [base, *port.swing(8.0, times=8, stiffness_n_per_m=300.0, half=20)]
     added = [b - a for a, b in pairwise(dampings)]
     assert len(added) == 6  # of eighteen half swings
     assert added == [pytest.approx(GIVEN, rel=0.25)] * 6
+
+
+def test_slow_swings_of_a_spring_add_no_more_than_its_base_may_have_and_quick_ones_do() -> None:
+    """A body that swings slowly behind a late spring is left to swing by a device that is held faster."""
+    slow, quick = Port(), Port()
+    assert max(slow.swing(20.0, times=12, stiffness_n_per_m=300.0, half=40)) == Params().most_base_n_s_per_m
+    assert max(quick.swing(20.0, times=12, stiffness_n_per_m=300.0, half=20)) > 1.5 * Params().most_base_n_s_per_m
+    assert quick.swing(20.0, times=6, stiffness_n_per_m=300.0, half=40) == [], "and slow ones take nothing off"
 
 
 def test_each_half_swing_that_gives_nothing_takes_off_a_twentieth_down_to_what_was_too_little() -> None:
@@ -154,7 +164,7 @@ def test_damping_comes_in_ten_milliseconds() -> None:
 
 def test_a_spring_that_comes_into_force_anew_begins_anew_and_a_force_goes_on() -> None:
     spring, force = Port(), Port()
-    spring.swing(20.0, times=9, stiffness_n_per_m=300.0)
+    spring.swing(20.0, times=9, stiffness_n_per_m=300.0, half=20)
     force.swing(20.0, times=3)
     for port, stiffness_n_per_m in ((spring, 300.0), (force, 0.0)):
         assert port.damping > 50.0

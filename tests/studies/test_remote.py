@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -76,6 +77,21 @@ def test_a_tool_comes_to_lie_where_table_and_push_balance() -> None:
     for count in range(1, 400):
         tool.step(0.01, Seen(0.0, 3.0 * 0.01 * count), update)
     assert update.position_m[0] == pytest.approx(-3.0 / 5000.0, rel=1e-3)
+
+
+def test_a_tool_at_rest_is_not_kicked_by_states_that_are_older_or_newer_than_its_steps() -> None:
+    """The mean of a constant push is that push, over whatever time it is seen; over the step's own it is not."""
+    tool, update = Tool(0.1, 1000.0, 500.0), Update()
+    steps = random.Random(3)
+    saw = 0
+    path_m = []
+    for count in range(1, 400):
+        sees = max(saw, 10 * count - steps.choice((0, 3, 10)))  # ticks of a millisecond
+        tool.step(0.01, Seen(0.0, 3.0 * 1e-3 * sees, 1e-3 * (sees - saw)), update)
+        saw = sees
+        path_m.append(update.position_m[0])
+    assert max(path_m[100:]) - min(path_m[100:]) < 1e-9
+    assert path_m[-1] == pytest.approx(-3.0 / 1000.0)
 
 
 def test_a_tuned_wall_ends_at_a_fifth_and_rises_no_faster_than_it_may() -> None:
