@@ -85,3 +85,26 @@ def test_a_window_counts_what_some_damper_holds_and_tells_what_the_law_does_not(
     ]
     assert json.loads(found.json())["lost"][1]["dampers"] == 1
     assert [table.row_count for table in (windows_table(found.windows), lost_table(found.lost))] == [4, 3]
+
+
+@pytest.mark.nightly
+def test_of_two_couplings_as_stiff_and_as_late_one_needs_from_the_beginning_what_the_other_does_not_bear() -> None:
+    """Of 6 kN/m and 20 ms: 60 N s/m within the first tenth of a second, and no more than 30."""
+    needs, bears = CompiledCase(draw(102, 263, "tool")), CompiledCase(draw(103, 25, "tool"))
+    values = (2, 5, 10, 20, 30, 60, 80, 120, 180, 270, 400)
+
+    def held(case: CompiledCase, first: float, at_s: float) -> set[int]:
+        laws = (
+            LawSpec(
+                "changing",
+                "tests.studies.changing_damper",
+                {"first_n_s_per_m": first, "later_n_s_per_m": float(later), "at_s": at_s},
+            )
+            for later in values
+        )
+        return {value for value, law in zip(values, laws, strict=True) if case.run(law)[0] == Outcome.SETTLED}
+
+    assert held(needs, 0.0, 0.0) == {60, 80, 120, 180, 270, 400}
+    assert held(needs, 20.0, 0.1) == set(), "thrown about, it is not brought down"
+    assert held(bears, 0.0, 0.0) == {2, 5, 10, 20, 30}
+    assert held(bears, 100.0, 1.0) == set(), "left to swing for a second"
