@@ -110,9 +110,8 @@ class RemoteProcess:
             realtime=loop.realtime and bool(cpus),
         ).packed()
         self._descriptor = loop.shared.descriptor
-        if self._process is None:
-            self._start()
-        self._send()
+        if self._process is not None:  # else `turn` starts it
+            self._send()
 
     def wait_ready(self) -> None:
         """Return when clients can come, at once where it is not needed.
@@ -141,11 +140,27 @@ class RemoteProcess:
         self._looked_s = now_s
         if not self._settings:
             return
-        if self._process is None:
-            if now_s >= self._due_s:
-                self._start()
-                self._send()
+        trouble = self._trouble(now_s)
+        if not trouble:
             return
+        self._end()
+        if now_s - self._started_s > STEADY_S:
+            self._wait_s = 0.0
+        self._due_s = now_s + self._wait_s
+        again = f"is started again in {self._wait_s:g} s" if self._wait_s else "is started again"
+        self._wait_s = min(max(FIRST_S, 2.0 * self._wait_s), LONGEST_S)
+        yield f"the process that hears clients {trouble}; it {again}, until then what they drive is let go"
+
+    def _trouble(self, now_s: float) -> str:
+        """Start it where that is due, else look how it is: what is wrong, "" when nothing is."""
+        if self._process is None:
+            try:
+                if now_s >= self._due_s:
+                    self._start()
+                    self._send()
+            except OSError as error:  # no room for one more: no reason to end
+                return f"cannot be started ({error.strerror})"
+            return ""
         trouble = ""
         while said := self._said():
             self._heard_s = now_s
@@ -155,19 +170,9 @@ class RemoteProcess:
                 self.news = self.news or said["remote_owner"] != self.counts["remote_owner"]
                 self.counts = said
         code = self._process.poll()
-        if code is None and now_s - self._heard_s <= SILENT_S:
-            return
         if code is None:
-            trouble = f"stood still for more than {SILENT_S:g} s"
-        elif not trouble:
-            trouble = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-        self._end()
-        if now_s - self._started_s > STEADY_S:
-            self._wait_s = 0.0
-        self._due_s = now_s + self._wait_s
-        again = f"is started again in {self._wait_s:g} s" if self._wait_s else "is started again"
-        self._wait_s = min(max(FIRST_S, 2.0 * self._wait_s), LONGEST_S)
-        yield f"the process that hears clients {trouble}; it {again}, until then what they drive is let go"
+            return f"stood still for more than {SILENT_S:g} s" if now_s - self._heard_s > SILENT_S else ""
+        return trouble or (f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}")
 
     def close(self) -> None:
         """Have it end; its sockets go."""
@@ -175,7 +180,8 @@ class RemoteProcess:
         self._end()
 
     def _start(self) -> None:
-        channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._started_s = self._heard_s = self._looked_s = time.monotonic()
+        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
                 [
@@ -187,8 +193,6 @@ class RemoteProcess:
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
             )
-        self._channel = channel
-        self._started_s = self._heard_s = self._looked_s = time.monotonic()
 
     def _send(self) -> None:
         assert self._channel is not None
@@ -212,12 +216,13 @@ class RemoteProcess:
         return said
 
     def _end(self) -> None:
-        if self._process is None or self._channel is None:
+        if self._channel is None:
             return
         self._channel.close()
-        self._process.kill()  # it holds nothing that it would have to put away
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_END_TIMEOUT_S)
+        if self._process is not None:
+            self._process.kill()  # it holds nothing that it would have to put away
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_END_TIMEOUT_S)
         self._process = self._channel = None
         self.counts = _none_of(self._ports)
         for name in (SCENE, STATE):

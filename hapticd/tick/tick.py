@@ -114,9 +114,8 @@ class ControlTick:
         self.past_ports = Totals()
         self._gather()
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
-        self._blind = True
+        self._blind = self._calibrated = True
         self._excused = False
-        self._calibrated = True
         self._blind_gain = 0.0
         self._blind_from_n = [0.0] * axes
         self.motion.watch_speed(guard.max_speed_m_per_s < math.inf)

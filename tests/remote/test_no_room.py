@@ -1,0 +1,61 @@
+"""A computer with no room for another process: what clients drive waits, and the daemon goes on."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from hapticd.config.loading import parse
+from hapticd.config.walls import MAX_WALLS
+from hapticd.loop.memory import SharedMemory
+from hapticd.simulation.options import SimulationOptions
+from hapticd.supervisor import remote_process
+from hapticd.supervisor.remote_process import RemoteProcess
+from hapticd.tick.record import RecordLayout
+from hapticd_drivers.loopback import Loopback
+from tests.daemon.running import wait_until
+from tests.remote.stage import CONFIG
+
+
+@pytest.fixture
+def loop() -> Iterator[Any]:
+    """What the supervisor knows of a loop."""
+    shared = SharedMemory(RecordLayout(1, False, MAX_WALLS), 1000.0)
+    info = Loopback(SimulationOptions(), 1e-3).open()
+    yield SimpleNamespace(process=SimpleNamespace(pid=os.getpid()), info=info, realtime=False, shared=shared)
+    shared.close()
+
+
+def test_one_that_cannot_be_started_is_told_tried_again_later_and_ends_no_daemon(
+    loop: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = SimpleNamespace(now_s=1000.0)
+    remote = RemoteProcess(tmp_path)
+    tries = []
+
+    def refuse(*_arguments: object, **_more: object) -> None:
+        tries.append(clock.now_s)
+        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    with monkeypatch.context() as full:
+        full.setattr(remote_process, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
+        full.setattr(subprocess, "Popen", refuse)
+        remote.serve(parse(CONFIG, "lab.toml"), loop, None, 0)
+        told: list[str] = []
+        while len(tries) < 5:
+            told += remote.turn()
+            clock.now_s = round(clock.now_s + 0.01, 2)
+    assert [round(after - tries[0], 1) for after in tries] == [0.0, 0.0, 0.5, 1.5, 3.5]
+    assert "cannot be started (Resource temporarily unavailable); it is started again" in told[-1]
+    assert len(told) == 5
+    monkeypatch.setattr(remote, "_due_s", 0.0)
+    wait_until(lambda: not list(remote.turn()) and (tmp_path / "scene").exists(), "its sockets")
+    remote.close()
+    assert list(tmp_path.iterdir()) == []
