@@ -84,7 +84,7 @@ class Recovery:
             if control is None:
                 return None
         except (HapticdError, OSError) as error:
-            self._start = None
+            self.stop()
             self._put_off(str(error))
             return None
         self._start = None

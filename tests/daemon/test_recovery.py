@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
+import os
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -234,6 +236,23 @@ def test_the_loop_that_has_the_device_is_handed_over_and_nothing_is_looked_for_a
     monkeypatch.setattr(tries[0], "poll", lambda: found)
     assert made.turn(LOST, NO_CONFIG) is found
     assert not made.lost
+
+
+def test_a_loop_that_has_the_device_and_cannot_be_taken_is_not_left_alone_with_it(
+    looking: tuple[Recovery, list[UnderWay]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would hold the device against every try to come, and with `safety.auto_arm` its forces."""
+    made, tries = looking
+
+    def no_room() -> None:
+        raise OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
+
+    monkeypatch.setattr(tries[0], "poll", no_room)
+    assert made.turn(LOST, NO_CONFIG) is None
+    assert made.lost
+    assert tries[0].ended
+    try_now(made)
+    assert [each.ended for each in tries] == [True, False]
 
 
 def test_what_was_plugged_in_before_the_device_was_lost_is_no_news(
