@@ -27,6 +27,7 @@ Signs: x < 0 is inside the wall; a positive force pushes the device out.
 from __future__ import annotations
 
 import functools
+import inspect
 import typing
 from types import ModuleType
 from typing import Any, Literal
@@ -266,6 +267,11 @@ def check_law(law: ModuleType) -> None:
             raise PluginError(f"law {law.__name__}: has no `{part}` (a law needs Params, State, start, step)")
     if not (isinstance(law.Params, type) and issubclass(law.Params, LawParams)):
         raise PluginError(f"law {law.__name__}: Params must derive from hapticd.law.LawParams")
+    for part, arguments in (("start", "state, params, snapshot"), ("step", "state, params, tick")):
+        try:
+            inspect.signature(getattr(law, part)).bind(*arguments.split())
+        except TypeError:
+            raise PluginError(f"law {law.__name__}: {part} must take ({arguments})") from None
     _choices(law.Params)
     state_fields(law)
     learned_fields(law)

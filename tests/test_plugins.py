@@ -89,6 +89,8 @@ def test_a_module_that_is_not_there_is_an_error_of_the_users(elsewhere: Path, na
         ("1 / 0", "cannot be imported: ZeroDivisionError"),
         ("def broken(:", "cannot be imported: SyntaxError"),
         (GOOD_LAW.replace("def step", "def stop"), "has no `step`"),
+        (GOOD_LAW.replace("params, snapshot", "params"), r"start must take \(state, params, snapshot\)"),
+        (GOOD_LAW.replace("def step(", "step = 3\ndef stop("), r"step must take \(state, params, tick\)"),
         (GOOD_LAW.replace("(LawParams)", ""), "Params must derive from"),
         (GOOD_LAW.replace("x: float", "x: list[float]"), r"State\.x must be float, int or bool"),
     ],
