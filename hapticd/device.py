@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -115,6 +116,23 @@ class DeviceInfo:
     has_sequence: bool = False
     start_m: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def flaw(self) -> str:
+        """What no device can be, as `key = value: what is allowed`; "" when nothing is wrong."""
+        axes, spans = self.axes, self.workspace_m
+        found = len(spans) == len(axes) and all(-math.inf < low < high < math.inf for low, high in spans)
+        largest_n = math.inf if self.simulated else math.nextafter(math.inf, 0.0)
+        allowed = (
+            ("axes", 0 < len(set(axes)) == len(axes), "must be one name an axis"),
+            ("max_force_n", 0.0 < self.max_force_n <= largest_n, "must be more than 0 N, infinite only when simulated"),
+            ("resolution_m", 0.0 <= self.resolution_m < math.inf, "must be 0 m or more"),
+            ("workspace_m", found, "must be a lowest and a highest position for each axis"),
+            ("nominal_rate_hz", 0.0 < self.nominal_rate_hz < math.inf, "must be more than 0 Hz"),
+            ("safe_damping_n_s_per_m", 0.0 < self.safe_damping_n_s_per_m < math.inf, "must be more than 0 N s/m"),
+            ("host_silence_ms", self.host_silence_ms is None or self.host_silence_ms >= 0.0, "must be 0 ms or more"),
+        )
+        return next((f"{key} = {getattr(self, key)}: {words}" for key, good, words in allowed if not good), "")
 
 
 @dataclass(frozen=True, slots=True)

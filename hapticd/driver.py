@@ -19,7 +19,7 @@ from typing import ClassVar, Generic, Self, TypeVar
 from pydantic import Field
 
 from hapticd.device import MOST_METRICS, DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
-from hapticd.errors import DriverError, DriverStateError
+from hapticd.errors import DeviceProtocolError, DriverError, DriverStateError
 from hapticd.settings import Table
 from hapticd.trace import DriverTrace
 
@@ -167,6 +167,8 @@ class Driver(ABC, Generic[OptionsT]):
         if self.state is DriverState.CLOSED:
             try:
                 self._info = self._open()
+                if self._info.flaw:  # every limit is made of it
+                    raise DeviceProtocolError(f"{type(self).__name__}: DeviceInfo.{self._info.flaw}")
             except BaseException:
                 self._close()
                 raise

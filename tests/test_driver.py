@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
-from hapticd.driver import Driver, DriverState, Sample
-from hapticd.errors import DeviceNotFoundError
+from hapticd.driver import DeviceInfo, Driver, DriverState, Sample
+from hapticd.errors import DeviceNotFoundError, DeviceProtocolError
 from hapticd.simulation.options import SimulationOptions
 from hapticd_drivers.loopback import Loopback
 
@@ -56,6 +60,35 @@ def test_a_device_that_cannot_be_opened_is_not_entered() -> None:
         pytest.fail("the block was entered")
     assert driver.state is DriverState.CLOSED
     assert driver.closed == 1
+
+
+@pytest.mark.parametrize(
+    ("declared", "said"),
+    [
+        ({"max_force_n": math.nan}, "max_force_n = nan: must be more than 0 N"),
+        ({"max_force_n": -5.0}, r"max_force_n = -5\.0: must be more than 0 N"),
+        ({"max_force_n": math.inf, "simulated": False}, "max_force_n = inf: must be more than 0 N, infinite only"),
+        ({"axes": ()}, "axes"),
+        ({"axes": ("x", "x")}, "axes"),
+        ({"workspace_m": ()}, "workspace_m"),
+        ({"workspace_m": ((0.1, -0.1),)}, "workspace_m"),
+        ({"safe_damping_n_s_per_m": 0.0}, "safe_damping_n_s_per_m"),
+        ({"nominal_rate_hz": 0.0}, "nominal_rate_hz"),
+        ({"resolution_m": math.nan}, "resolution_m"),
+        ({"host_silence_ms": -1.0}, "host_silence_ms"),
+    ],
+)
+def test_a_device_that_declares_what_none_can_be_is_not_opened(declared: dict[str, Any], said: str) -> None:
+    """Every limit of the guard is made of it: with a force limit that is no number nothing would be limited."""
+
+    class Odd(Loopback):
+        def _open(self) -> DeviceInfo:
+            return replace(super()._open(), **declared)
+
+    driver = Odd(SimulationOptions(), PERIOD_S)
+    with pytest.raises(DeviceProtocolError, match=rf"Odd: DeviceInfo\.{said}"):
+        driver.open()
+    assert driver.state is DriverState.CLOSED
 
 
 def test_a_sample_shows_its_fields() -> None:
