@@ -1,4 +1,4 @@
-"""`hapticd status`: every daemon of this computer in a line or two, or as JSON."""
+"""`hapticd status`: every daemon of this computer in a few lines, or as JSON."""
 
 from __future__ import annotations
 
@@ -66,12 +66,13 @@ def _lines(one: Mapping[str, Any]) -> list[str]:
         f"law {status['law']}" + (" (failed, damping instead)" if status["fallback"] else ""),
         f"{f'{rate_hz:.0f}' if rate_hz else '?'} of {status['rate_hz']:g} Hz",
         f"{100.0 * one['late_share']:.2g} % late",
-        f"since {_shown(status['started_timestamp'])}",
-        status["device"] + (", simulated" if status["simulated"] else ""),
     )
-    lines = [f"{one['name']}: {', '.join(parts)}"]
+    device = status["device"] + (", simulated" if status["simulated"] else "")
+    lines = [f"{one['name']}: {', '.join(parts)}", f"  {device}, since {_shown(status['started_timestamp'])}"]
     if status["fault_code"]:
         lines.append(f"  fault {status['fault_code']} at {_shown(status['fault_timestamp'])}: {status['fault_text']}")
+    if status["latched"]:
+        lines.append("  no force until `hapticd clear`, then `hapticd arm`")
     lines.extend(_driven(status))
     lines.extend(f"  {warning}" for warning in status["warnings"])
     return lines
