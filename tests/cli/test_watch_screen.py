@@ -133,7 +133,7 @@ def test_eighty_columns_cut_nothing_that_somebody_waits_for() -> None:
     known.take([status, Event(0.0, 1, 103, "configuration 98032d17ef83: law ring-damping -> tdpa")], 0.0)
     lines = [line.plain for line in frame(known, "ipc:///x", 80, 40, 0.0)]
     text = " ".join(" ".join(lines).split())
-    assert "stopped by a fault 202: 1.01 m/s is above the limit of 1 m/s; then hapticd clear" in text
+    assert "stopped by fault 202: 1.01 m/s is above the limit of 1 m/s; then hapticd clear" in text
     assert "clear its workspace, then hapticd calibrate (and 1 more: hapticd status)" in text
     assert "skipped 123456 lost 77 " in text
     assert " device echo_us 123457 counter" in text

@@ -36,8 +36,8 @@ def _warnings(status: Status, width: int) -> Iterator[Text]:
     if not status.calibrated and not status.device_lost_timestamp:
         said.insert(0, "not calibrated, so without force: clear its workspace, then  hapticd calibrate")
     if status.latched:
-        fault = f" {status.fault_code}: {status.fault_text}" if status.fault_code else ""
-        said.insert(0, f"stopped by a fault{fault}; then  hapticd clear")
+        fault = f"fault {status.fault_code}: {status.fault_text}" if status.fault_code else "a fault"
+        said.insert(0, f"stopped by {fault}; then  hapticd clear")
     if len(said) > _MOST_WARNINGS:
         said = [said[0], f"{said[1]}  (and {len(said) - 2} more: hapticd status)"]
     for one in said:
