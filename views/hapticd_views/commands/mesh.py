@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hapticd.errors import ConfigError
+from hapticd.errors import ConfigError, HapticdError
 from hapticd.progress import progress_bar
 
 _ALONG = 64
@@ -39,7 +39,7 @@ def command(
         from hapticd_views.mesh.reading import read_mesh
         from hapticd_views.mesh.sampling import sample
     except ImportError as missing:
-        raise ConfigError(f"{missing.name} is not installed: pip install 'hapticd[mesh]'") from None
+        raise HapticdError(f"{missing.name} is not installed: pip install 'hapticd[mesh]'") from None
     from hapticd.replacing import write
 
     for option, value in (("--scale", scale), ("--voxel", voxel)):
