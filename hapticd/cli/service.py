@@ -73,6 +73,8 @@ def status(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
     else:
         for file in files:
             typer.echo(f"{file.state:9}  {file.path}")
+        if any(file.state != "installed" for file in files):
+            typer.echo("to put what is missing or changed in its place: sudo hapticd service install")
         if not systemd_runs():
             typer.echo("systemd does not run this computer")
         for unit in units:

@@ -183,6 +183,8 @@ def test_status_can_be_read_by_a_program() -> None:
     done = subprocess.run([hapticd, "service", "status", "--json"], capture_output=True, text=True, check=False)
     shown = json.loads(done.stdout)
     assert len(shown["files"]) == len(FILES) - 2 + len(SHARED)
+    told = subprocess.run([hapticd, "service", "status"], capture_output=True, text=True, check=False).stdout
+    assert ("sudo hapticd service install" in told) == (set(shown["files"].values()) != {"installed"})
     assert done.returncode == (0 if shown["units"] and set(shown["files"].values()) == {"installed"} else 1)
 
 
