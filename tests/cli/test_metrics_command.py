@@ -278,7 +278,10 @@ def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         listen = f"127.0.0.1:{taken.getsockname()[1]}"
         done = metrics(tmp_path, "--listen", listen)
-    assert (done.returncode, done.stderr) == (1, f"hapticd: --listen {listen}: Address already in use\n")
+    assert (done.returncode, done.stderr) == (
+        1,
+        f"hapticd: --listen {listen}: Address already in use; name another address or port\n",
+    )
 
 
 def test_without_the_extra_it_says_what_to_install(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def _serve(listen: str) -> None:
     try:
         server = MetricsServer(host, port, Asked(lambda: _metrics(_daemons())))
     except OSError as error:
-        raise HapticdError(f"--listen {listen}: {error.strerror}") from error
+        raise HapticdError(f"--listen {listen}: {error.strerror}; name another address or port") from error
     signal.signal(signal.SIGTERM, _end)
     with server:
         typer.echo(f"serving {server.url}", err=True)
