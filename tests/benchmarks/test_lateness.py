@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from hapticd.cli import main
 from hapticd.errors import HapticdError, RealtimeError
 from hapticd.measure import MachineWatch, Quantiles, Verdict, doubtful
 from hapticd_bench import lateness, lateness_block
@@ -222,6 +223,13 @@ class TestWitness:
     def test_a_processor_that_is_not_there_is_named_by_the_witness(self, witness: Path) -> None:
         with pytest.raises(RealtimeError, match="sched_setaffinity"):
             lateness_block.check_rights(witness, 1000)
+
+
+def test_a_processor_that_is_not_there_is_a_misuse(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["bench", "lateness", "--cpu", "100000"])
+    assert ended.value.code == 2
+    assert "--cpu 100000: must be one that this process may use: " in capsys.readouterr().err
 
 
 def test_without_a_compiler_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
+from hapticd.errors import ConfigError
 from hapticd_bench.commands.tables import (
     make_console,
     measuring,
@@ -40,6 +42,9 @@ def lateness(
     """
     from hapticd_bench import lateness as measured
 
+    there = sorted(os.sched_getaffinity(0))
+    if cpu is not None and cpu not in there:
+        raise ConfigError(f"--cpu {cpu}: must be one that this process may use: {', '.join(map(str, there))}")
     if quick:
         blocks, block = 1, 2.0
     with measuring(len(measured.plan(blocks, control)) * block) as progress:
