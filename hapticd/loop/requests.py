@@ -86,8 +86,11 @@ class RequestHandler:
         yield
 
     def _do_clear(self) -> Generator[None, None, None]:
-        self._session.tick.guard.clear()
-        self._session.event(EventCode.CLEARED, "fault cleared; the device stays disarmed")
+        guard = self._session.tick.guard
+        latched = guard.latched
+        guard.clear()
+        said = "fault cleared; the device stays disarmed" if latched else "nothing to clear: no fault has stopped it"
+        self._session.event(EventCode.CLEARED, said)
         yield
 
     def _do_calibrate(self) -> Generator[None, None, None]:

@@ -57,7 +57,7 @@ class StatusBuilder:
         self._ticks = 0
         self._ticks_dropped = 0
         self._events_dropped = 0
-        self._rate_from = (time.monotonic(), 0)
+        self._rate_from = (0.0, 0, 0)  # when [s], after how many ticks, and when the last of them was due [ns]
         self._fault: LoopEvent | None = None
         self._fault_s = 0.0
         self._faults = 0
@@ -72,6 +72,8 @@ class StatusBuilder:
             if record.busy_us > self._busy_max_us:
                 self._busy_max_us = record.busy_us
         if records:
+            if self.last is None:
+                self._rate_from = (time.monotonic(), 1, records[0].deadline_ns)
             self._ticks += len(records)
             self.last = records[-1]
             self._ticking = True
@@ -195,11 +197,14 @@ class StatusBuilder:
         return tuple(wall.stiffness_n_per_m for wall in walls)
 
     def _measure_rate(self) -> None:
+        """By when ticks were due: when they are fetched depends on how busy this process is."""
         now_s = time.monotonic()
-        since_s, since_ticks = self._rate_from
-        if now_s - since_s >= _RATE_S:
-            self.rate_hz = (self._ticks - since_ticks) / (now_s - since_s)
-            self._rate_from = (now_s, self._ticks)
+        since_s, since_ticks, since_ns = self._rate_from
+        if self.last is None or now_s - since_s < _RATE_S:
+            return
+        span_ns = self.last.deadline_ns - since_ns
+        self.rate_hz = (self._ticks - since_ticks) / (span_ns * 1e-9) if span_ns > 0 else 0.0
+        self._rate_from = (now_s, self._ticks, self.last.deadline_ns)
 
     def _epoch_s(self, monotonic_s: float) -> float:
         return timestamp_s(round(monotonic_s * 1e9), self._offset_ns)

@@ -96,6 +96,20 @@ def test_a_device_that_is_lost_is_not_calibrated_until_the_next_loop_says_so(loo
     assert (found.calibrated, found.latched, found.law_index) == (True, False, 0)
 
 
+def test_the_rate_is_that_of_the_ticks_and_not_of_when_they_were_fetched(
+    loop: LoopProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A supervisor that gets no processor fetches the ticks of 0.6 s late, and those of 0.9 s at once."""
+    status, recovery, now_s = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(), 100.0
+    monkeypatch.setattr("time.monotonic", lambda: now_s)
+    rates = []
+    for passed_s, ticks in ((0.6, range(600)), (0.6, range(600, 700)), (0.6, range(700, 1600)), (0.6, range(0))):
+        status.add([replace(record(Flag.ARMED), seq=tick, deadline_ns=tick * 1_000_000) for tick in ticks])
+        now_s += passed_s
+        rates.append(made(status, loop, recovery).measured_rate_hz)
+    assert rates == pytest.approx([1000.0, 1000.0, 1000.0, 0.0])
+
+
 def test_who_comes_once_it_is_ready_finds_no_status_of_before_the_first_tick(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text(HELD_UP)
     with Daemon(PRESSED, pythonpath=tmp_path) as daemon:

@@ -358,3 +358,11 @@ def test_what_needs_it_disarmed_waits_for_the_ramp_of_a_disarming_just_before(
     assert code in bench.told()
     assert bench.tick.guard.mode is Mode.DISARMED
     assert bench.driver.state is DriverState.OPEN
+
+
+def test_what_is_cleared_without_a_fault_is_said_to_be_nothing_and_stays_armed(bench: Bench) -> None:
+    bench.ticks(1)
+    assert bench.ask(do="arm") == ""
+    assert bench.ask(do="clear") == ""
+    assert bench.told()[EventCode.CLEARED].text.startswith("nothing to clear")
+    assert bench.tick.guard.mode is Mode.ARMED
