@@ -252,6 +252,9 @@ class ControlTick:
             laws = self._start_laws([(contact, self._fallback_law()) for contact in (*new, *turned)])
         for contact, law in laws:
             self._take_law(contact, law)
+        if self.guard.limited:  # who goes on would take a larger share of the limit at once
+            for contact in self._active:
+                self._blend(contact)
 
     def totals(self) -> Totals:
         """The books of all that there ever was."""

@@ -164,6 +164,8 @@ class SpaceTick(ControlTick):
             laws = self._start_laws([(channel, self._fallback_law()) for channel in fresh])
         for channel, law in laws:
             self._take_law(channel, law)
+        if self.guard.limited:
+            blending = [channel for contact in (*self.solids, *self._fading) for channel in contact.channels]
         for one in blending:
             self._blend(one)
         self._take_solids()

@@ -12,7 +12,7 @@ from hapticd.errors import ConfigError
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.contact import RunningLaw
 from tests.tick.space import passing_fault
-from tests.tick.space.rig import INFO, Rig, apart, ball, config, table
+from tests.tick.space.rig import INFO, Rig, apart, ball, config, length, table
 
 RAMP_TICKS = 50
 
@@ -67,6 +67,35 @@ def test_no_force_jumps_when_it_is_armed_again_while_an_object_still_fades_out(a
     assert before[2] > 1.0
     assert apart(rig.force, before) <= 2.0 * 12.0 / RAMP_TICKS
     rig.to((0.0, 0.0, 0.0292), 2 * RAMP_TICKS)
+    assert rig.unbalanced_j() < 1e-13
+
+
+WALL = '[[scene.walls]]\naxis = "{}"\nstiffness_n_per_m = {}\n'
+ON_ITS_SIDE = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("floor", "side", "softer"),
+    [
+        (WALL.format("z", 12000.0), WALL.format("y", 12000.0), WALL.format("y", 5000.0)),
+        (table("floor", "plane", 12000.0), table("side", "plane", 9000.0, orientation=ON_ITS_SIDE), ""),
+        (table("floor", "plane", 12000.0), WALL.format("y", 9000.0), ""),
+    ],
+    ids=["a wall is softer", "a plane goes", "a wall goes beside a plane"],
+)
+def test_no_force_jumps_when_one_of_two_that_share_the_limit_changes(floor: str, side: str, softer: str) -> None:
+    """The one that stays took the most of it at once, 8 N in a tick: it asks for many times the limit."""
+    inside = (0.0, -0.008, -0.008)
+    rig = Rig(floor + side, "none").start((0.0, 0.01, 0.01)).to(inside, 300).to(inside, 60)
+    assert length(rig.force) == pytest.approx(12.0)
+    rig.switch(floor + softer)
+    worst = 0.0
+    for _ in range(3 * RAMP_TICKS):
+        last = rig.force
+        rig.go(inside)
+        worst = max(worst, apart(rig.force, last))
+    assert worst <= 2.0 * 2.0 * 12.0 / RAMP_TICKS
+    assert length(rig.force) == pytest.approx(12.0)
     assert rig.unbalanced_j() < 1e-13
 
 
