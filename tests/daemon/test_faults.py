@@ -22,7 +22,7 @@ from hapticd.faults.store import FaultStore
 from hapticd.tick.event import EventCode
 from tests.daemon.running import Subscriber, all_records, gone, wait_until
 from tests.daemon.test_deaths import nothing_left
-from tests.faults.rig import Felt, Report, Rig, events_until
+from tests.faults.rig import ATTEMPTS, Felt, Report, Rig, anew_where_late, events_until
 
 LIMIT_N = 12.0
 RAMP = 50
@@ -32,9 +32,6 @@ BLIND_RAMP = 10
 FROZEN = 20
 BEFORE = 5000
 """Ticks before a fault that are kept of it; deadlines that a busy computer skips have none."""
-
-ATTEMPTS = 5
-"""A computer that holds the loop up makes it let go, and rightly so, whatever else is provoked."""
 
 
 def report_felt(report: Report, felt: Felt) -> None:
@@ -57,6 +54,7 @@ def faults(events: list[dict[str, Any]]) -> list[int]:
         ("slow 70", EventCode.LOOP_LATE, RAMP + 2),
     ],
 )
+@anew_where_late
 def test_what_the_device_does_wrong_takes_the_force_out_by_a_ramp_until_cleared(
     order: str, code: EventCode, most_writes: int, record_property: Report
 ) -> None:
@@ -90,6 +88,7 @@ SLOW = "end = time.monotonic() + 7e-4\n        while time.monotonic() < end: pas
 @pytest.mark.parametrize(
     ("failure", "code"), [("raise ValueError", EventCode.LAW_FAILED), (SLOW, EventCode.LAW_OVER_BUDGET)]
 )
+@anew_where_late
 def test_a_law_that_fails_is_ramped_out_with_damping(failure: str, code: EventCode, record_property: Report) -> None:
     with Rig(laws={"bad": failure}) as rig, rig.pressed().subscriber() as subscriber:
         rig.switch('\n[controller]\nlaw = "mylab.bad"\n')
@@ -109,6 +108,7 @@ def test_a_law_that_fails_is_ramped_out_with_damping(failure: str, code: EventCo
 LOST = ("unplugged", "oserror", "no-write", "garbage", "hang-close")
 
 
+@anew_where_late
 def test_a_lost_device_is_without_force_and_comes_back_disarmed(record_property: Report) -> None:
     """All at once, since a device is looked for from one second on."""
     with contextlib.ExitStack() as stack:
@@ -150,6 +150,7 @@ def test_a_lost_device_is_without_force_and_comes_back_disarmed(record_property:
             assert (record.ticks[-1].seq, summary.after_s) == (found["seq"], 0.0)
 
 
+@anew_where_late
 def test_the_device_arms_itself_again_only_where_it_did_so_before_and_nobody_objects() -> None:
     with Rig(safety="auto_arm = true") as rig, rig.subscriber() as subscriber:
         rig.pressing()
@@ -171,6 +172,7 @@ def test_the_device_arms_itself_again_only_where_it_did_so_before_and_nobody_obj
         rig.goes_on("clear", "arm")
 
 
+@anew_where_late
 def test_while_the_device_is_gone_commands_and_files_are_taken_for_its_return() -> None:
     with Rig(safety="auto_arm = true") as rig, rig.subscriber() as subscriber:
         rig.pressing()
@@ -194,6 +196,7 @@ def test_while_the_device_is_gone_commands_and_files_are_taken_for_its_return() 
         assert nothing_left(rig.daemon)
 
 
+@anew_where_late
 def test_a_fault_of_the_devices_own_is_latched_and_the_device_opened_anew(record_property: Report) -> None:
     with Rig() as rig, rig.pressed().subscriber() as subscriber:
         rig.order("fault")
@@ -210,6 +213,7 @@ def test_a_fault_of_the_devices_own_is_latched_and_the_device_opened_anew(record
         rig.goes_on("clear", "arm")
 
 
+@anew_where_late
 def test_a_device_that_hangs_is_released_from_outside_and_the_service_ends(record_property: Report) -> None:
     with contextlib.ExitStack() as stack:
         rigs = {order: stack.enter_context(Rig()) for order in ("hang-read", "hang-write")}
@@ -228,6 +232,7 @@ def test_a_device_that_hangs_is_released_from_outside_and_the_service_ends(recor
             assert summary.ticks > 500
 
 
+@anew_where_late
 def test_a_helper_that_was_killed_is_replaced_when_it_is_needed_and_outlives_nobody() -> None:
     with contextlib.ExitStack() as stack:
         first, second = (stack.enter_context(Rig()).pressed() for _ in range(2))
@@ -241,6 +246,7 @@ def test_a_helper_that_was_killed_is_replaced_when_it_is_needed_and_outlives_nob
         wait_until(lambda: gone(helper), "the helper to end")
 
 
+@anew_where_late
 def test_that_nobody_stands_by_to_release_the_device_is_told_and_the_loop_goes_on() -> None:
     with Rig() as rig, rig.pressed().subscriber() as subscriber:
         assert subscriber.until("hapticd/status")["warnings"] == []
@@ -264,6 +270,7 @@ def helper_of(rig: Rig) -> int:
     raise AssertionError("there is no helper")
 
 
+@anew_where_late
 def test_a_supervisor_that_stalls_takes_the_force_out(record_property: Report) -> None:
     with Rig(safety="supervisor_stall_s = 0.3") as rig, rig.pressed().subscriber() as subscriber:
         memory = rig.daemon.memory()
@@ -283,6 +290,7 @@ def test_a_supervisor_that_stalls_takes_the_force_out(record_property: Report) -
         rig.goes_on("clear", "arm")
 
 
+@anew_where_late
 def test_a_burst_of_missed_deadlines_is_a_warning_and_one_event(record_property: Report) -> None:
     with Rig() as rig, rig.pressed().subscriber() as subscriber:
         rig.order("slow 20")
@@ -294,6 +302,7 @@ def test_a_burst_of_missed_deadlines_is_a_warning_and_one_event(record_property:
         assert not (rig.daemon.directory / "state").exists(), "a warning is no fault to keep a record of"
 
 
+@anew_where_late
 def test_records_reach_back_five_seconds_and_the_oldest_goes_first() -> None:
     with Rig(more="[faults]\nkeep = 1") as rig, rig.pressed().subscriber() as subscriber:
         for topic, fields in subscriber.maps():
@@ -322,6 +331,7 @@ def test_records_reach_back_five_seconds_and_the_oldest_goes_first() -> None:
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or shutil.which("unshare") is None, reason="needs root and util-linux's unshare")
+@anew_where_late
 def test_a_full_disk_costs_the_record_and_nothing_else() -> None:
     mount = 'mkdir -p "$HAPTICD_STATE_DIR" && mount -t tmpfs -o size=64k tmpfs "$HAPTICD_STATE_DIR" && exec "$@"'
     with Rig(prefix=("unshare", "--mount", "sh", "-c", mount, "sh")) as rig, rig.pressed().subscriber() as subscriber:

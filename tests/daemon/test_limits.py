@@ -6,7 +6,7 @@ import pytest
 
 from hapticd.tick.event import EventCode
 from tests.daemon.running import Daemon, Subscriber
-from tests.faults.rig import Rig, events_until
+from tests.faults.rig import Rig, anew_where_late, events_until
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,7 @@ def test_the_status_names_the_smallest_limit_that_holds(safety: str, limit_n: fl
         assert subscriber.until("hapticd/status")["max_force_n"] == limit_n
 
 
+@anew_where_late
 def test_a_limit_that_the_lost_device_cannot_have_does_not_end_the_daemon() -> None:
     with Rig() as rig, rig.subscriber() as subscriber:
         rig.order("unplugged")

@@ -8,9 +8,10 @@ import pytest
 
 from hapticd.tick.event import EventCode
 from tests.daemon.running import Subscriber
-from tests.faults.rig import Rig, events_until
+from tests.faults.rig import Rig, anew_where_late, events_until
 
 
+@anew_where_late
 def test_walls_stand_where_it_was_tared_until_the_device_is_lost_and_then_nobody_arms_by_himself() -> None:
     with Rig(safety="auto_arm = true") as rig, rig.subscriber() as subscriber:
         rig.pressing()
