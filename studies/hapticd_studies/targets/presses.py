@@ -20,6 +20,7 @@ from hapticd.simulation.batch import Batch, BatchResult, Point
 from hapticd.simulation.options import SimulationOptions
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.robustness.devices import DURATION_S, Device, draw
+from hapticd_studies.robustness.readings import params_on
 from hapticd_studies.transparency.devices import MAX_FORCE_N
 from hapticd_studies.transparency.runs import columns_of
 
@@ -71,7 +72,8 @@ def noisy(seed: int, index: int) -> Device:
 
 def at_rest(devices: Sequence[Device], law: LawSpec, criterion: Criterion, threads: int | None) -> list[list[float]]:
     """Of each device whether it is held, and whether its rest spans less than two counts."""
-    points, result = _pressed(devices, law.law, [law.params] * len(devices), criterion, threads)
+    params = [params_on(law, device) for device in devices]
+    points, result = _pressed(devices, law.law, params, criterion, threads)
     held = judge(criterion, points, result) == Outcome.SETTLED
     counts = np.array([device.options.resolution_m for device in devices])
     return _rows(held, result.peak_to_peak_m < QUIET_COUNTS * counts)
