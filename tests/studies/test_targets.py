@@ -73,6 +73,9 @@ def test_what_reaches_a_missed_target_is_said_with_what_it_loses() -> None:
     assert free.says == "better reaches it, and nothing that the default reaches is lost"
     (none,) = missed({"default": rows(98.0, 0.1, 1.0), "weak": rows(97.0, 0.1, 1.0)})
     assert none.says == "none of 1 reaches it"
+    _, pulls = missed({"default": rows(98.0, 0.1, 1.0), "weak": rows(97.0, 3.0, 1.0)}, ("pulls",))
+    assert (pulls.target.what, pulls.says) == ("pulls", "the default reaches it here; none of 1 reaches it")
+    assert pulls.others[0].costs == ()
 
 
 @pytest.mark.nightly

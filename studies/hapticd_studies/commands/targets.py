@@ -11,7 +11,7 @@ from rich.console import Console
 from hapticd.errors import ConfigError
 from hapticd_studies.grid.output import require_cluster, require_extra, require_folder, write
 
-_TARGETS = ("targets.json", "targets.md")
+_TARGETS = ("targets.json", "targets.md", "missed.md")
 _FRONT = ("front.json", "front.png")
 _MISSED = ("missed.json", "missed.md")
 
@@ -29,6 +29,9 @@ def command(
         bool,
         typer.Option("--missed", help="What reaches each target that ring-damping misses, and what that loses."),
     ] = False,
+    also: Annotated[
+        str, typer.Option(help="Targets that stand in missed.md although few devices let them be reached: words.")
+    ] = "tremor,unfelt",
     output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("targets"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
@@ -37,8 +40,9 @@ def command(
     """Hold laws against the targets of the default law: what holds, what it costs, what is felt.
 
     With --front, settings of ring-damping and constant dampers over the same moving hands: settling against damping
-    and against pulls, with a picture. With --missed, other settings, other laws and dampers chosen for each device, at
-    each target that the default misses. Interrupted, the same command goes on where it was.
+    and against pulls, with a picture. missed.md has what reaches each target that the first law misses, and what that
+    loses: of the other laws, or with --missed of its settings, other laws and dampers chosen for each device.
+    Interrupted, the same command goes on where it was.
 
     Example: hapticd study targets --share 0.15
 
@@ -64,6 +68,7 @@ def command(
     from hapticd_studies.targets.report import front_of, front_table, json_of, markdown, table, targets_of
     from hapticd_studies.targets.table import known_beforehand
 
+    words = [word.strip() for word in also.split(",") if word.strip()]
     chosen = parse_laws(FRONT if front else against.LAWS if missed else laws, {})
     only = MOVED_ONLY if front else WITH_HINDSIGHT if missed else USUAL
     plan = TargetsPlan(seed, size_of(share), chosen, Criterion(), only)
@@ -76,12 +81,13 @@ def command(
             shown: Any = front_table(points)
         elif missed:
             found = targets_of(plan, tables)
-            lost = against.missed(found | known_beforehand(plan, tables[0]))
+            lost = against.missed(found | known_beforehand(plan, tables[0]), words)
             shown = against.markdown(lost)
             content = [json_of(plan, found, lost), shown.encode()]
         else:
             found = targets_of(plan, tables)
-            content = [json_of(plan, found), markdown(plan, found).encode()]
+            lost = against.missed(found, words)
+            content = [json_of(plan, found, lost), markdown(plan, found).encode(), against.markdown(lost).encode()]
             shown = table(plan, found)
         for file, one in zip(files, content, strict=True):
             write(output / file, one)

@@ -72,7 +72,7 @@ class Other:
 
 @dataclass(frozen=True, slots=True)
 class Missed:
-    """A target that the default misses.
+    """A target that the default misses, or that was asked for.
 
     Attributes:
         target: what the default reaches of it.
@@ -89,26 +89,29 @@ class Missed:
         """What follows."""
         met = [one for one in self.others if one.met]
         free = [one for one in met if not one.costs]
+        here = "the default reaches it here; " if self.target.met else ""
         if free:
-            return f"{free[0].law} reaches it, and nothing that the default reaches is lost"
+            return f"{here}{free[0].law} reaches it, and nothing that the default reaches is lost"
         if met:
-            return f"{len(met)} of {self.tried} reach it, and each loses what the default reaches"
-        return f"none of {self.tried} reaches it"
+            return f"{here}{len(met)} of {self.tried} reach it, and each loses what the default reaches"
+        return f"{here}none of {self.tried} reaches it"
 
     def declared(self) -> dict[str, Any]:
         """For a file of results."""
         return {**self.target.declared(), "others": [asdict(one) for one in self.others], "says": self.says}
 
 
-def missed(found: dict[str, list[Reached]]) -> list[Missed]:
+def missed(found: dict[str, list[Reached]], also: Sequence[str] = ()) -> list[Missed]:
     """Every target that the first law misses, with all others at it.
 
     Args:
         found: the targets of each law, the default first; those that one cannot tell are left out or NaN.
+        also: words in the names of targets that are judged even if few devices let the first law reach them.
     """
     (_, own), *rest = found.items()
-    kept = [one for one in own if one.met and LATER not in one.what]
-    lost = [one for one in own if not one.met and LATER not in one.what]
+    own = [one for one in own if LATER not in one.what]
+    kept = [one for one in own if one.met]
+    lost = [one for one in own if not one.met or any(word in one.what for word in also)]
     return [_missed(one, kept, [(law, {each.what: each for each in rows}) for law, rows in rest]) for one in lost]
 
 
@@ -119,6 +122,7 @@ def _missed(target: Reached, kept: Sequence[Reached], rest: Sequence[tuple[str, 
         if here is None or math.isnan(here.reached):
             continue
         both = [(one, rows[one.what]) for one in kept if one.what in rows and not math.isnan(rows[one.what].reached)]
+        both = [(own, other) for own, other in both if own.what != target.what]
         costs = [Cost(own.what, own.reached, other.reached) for own, other in both if not other.met]
         costs.sort(key=lambda cost: -abs(math.log(max(cost.here, 1e-3) / max(cost.default, 1e-3))))
         others.append(Other(law, here.reached, here.met, tuple(costs)))
