@@ -191,7 +191,7 @@ def test_the_page_of_the_paper_has_the_claims_and_verdicts_that_come_out(evidenc
 
 
 def test_the_page_of_the_paper_has_the_readings_that_come_out(evidence: Evidence) -> None:
-    said = dict(re.findall(r"^\| (.*?) \| (\d+) \|$", block("readings"), re.MULTILINE))
+    said = dict(re.findall(r"^\| (.*?) \| (\d+) \| [^|]+ \|$", block("readings"), re.MULTILINE))
     table = evidence.table
     passed = {reading.name: str(count) for reading, count in zip(table.readings, table.passed, strict=True)}
     assert {name: said.get(name, "28") for name in passed} == passed
@@ -250,3 +250,6 @@ def test_a_run_that_never_settles_says_so() -> None:
     assert figures.settled_s is None
     assert figures.outcome == Outcome.MOVING.words
     assert not figures.imperceptible
+    assert figures.felt_index is not None
+    assert figures.felt_index > 10.0
+    assert figures.force_chatter_n > 1.0

@@ -94,7 +94,7 @@ def _no_parameter(evidence: Evidence) -> Claim:
         "Section III",
         "No parameter of device, human or wall has to be known",
         f"three device models of 0.08 to 0.5 kg, {len(evidence.shares.drops_m)} starts each, the same parameters",
-        "come to rest: " + ", ".join(parts),
+        "come to rest: " + ", ".join(parts) + evidence.shares.models.rest(),
         bool(shares.min() > 0.95),
         "The law identifies the mass that it feels, to bound its damping, and is told the step of the position sensor.",
     )

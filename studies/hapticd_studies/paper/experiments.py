@@ -74,7 +74,7 @@ def _native_limit(evidence: Evidence) -> Claim:
         "The device alone renders 8 kN/m and no more",
         f"no law, {_HANDS}, {len(evidence.shares.drops_m)} starts each",
         f"come to rest within {Criterion().still_m * 1e3:g} mm: {', '.join(parts)}; widest span at 8 kN/m "
-        f"{millimetres(float(spans_m.max()))}",
+        f"{millimetres(float(spans_m.max()))}{evidence.shares.native.rest()}",
         all(share.min() == 1.0 if k <= _STATED_N_PER_M else share.max() < 0.2 for k, share in shares.items()),
         f"{_CALIBRATED} Held to the 0.05 mm that the method is held to, the limit of the model is "
         f"{_limit_n_per_m(shares) * 1e-3:g} kN/m.",
@@ -105,7 +105,7 @@ def _held(evidence: Evidence) -> Claim:
         "With the method 12, 18 and 20 kN/m are stable",
         f"{', '.join(HELD)}, and {_HANDS}, {len(evidence.shares.drops_m)} starts each",
         f"come to rest in place: {', '.join(parts)}; the last after {at_rest.max(initial=0.0):.2f} s, widest span "
-        f"{millimetres(float(held.peak_to_peak_m.max()))}",
+        f"{millimetres(float(held.peak_to_peak_m.max()))}{held.rest()}",
         bool(shares.min() > 0.99) and all(evidence.runs[name].settled for name in HELD),
     )
 
@@ -121,7 +121,8 @@ def _gain(evidence: Evidence) -> Claim:
         f"no law at {', '.join(f'{k * 1e-3:g}' for k in NATIVE_N_PER_M)} kN/m, the method at "
         f"{', '.join(f'{k * 1e-3:g}' for k in (*HELD_N_PER_M, *BEYOND_N_PER_M))}; {_HANDS}",
         f"every start rests up to {alone * 1e-3:g} kN/m alone, up to {holding * 1e-3:g} kN/m with the method"
-        f"{', the stiffest tried' if holding == tried else ''}: {gain:.2g} times",
+        f"{', the stiffest tried' if holding == tried else ''}: {gain:.2g} times"
+        f"{evidence.shares.beyond.rest()}",
         bool(holding >= 20e3 and gain >= 2.5),
         "Where the model's own limit with the method is, hapticd study zwidth shows.",
     )
@@ -141,7 +142,8 @@ def _below_zero(evidence: Evidence) -> Claim:
         "Fig. 9 d-f",
         "The contact is stable although its energy goes below zero",
         f"{', '.join(HELD)} under 3 N; the same under 3.03 N, which no whole number of counts balances",
-        f"lowest energy in the first {SHOWN_S:g} s, and in brackets in 6 s [mJ]: {', '.join(parts)}",
+        f"lowest energy in the first {SHOWN_S:g} s, and in brackets in 6 s [mJ]: {', '.join(parts)}; at the end "
+        + "; ".join(f"{name} {evidence.figures[name].rest}" for name in (*HELD, *OFF_COUNT)),
         bool(settled and max(lowest_j) < 0.0),
         "What is below zero in the first half second is the first cycles' work; what comes later is drift at rest, "
         "between steps of the position (see bounded-generation-quantised).",

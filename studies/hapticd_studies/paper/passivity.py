@@ -61,7 +61,7 @@ def _unstable(evidence: Evidence, key: str, form: str, name: str, asked: Asked, 
         f"TDPA is not stable at 12 kN/m: {form}",
         f"{name}, and 3 N, {len(evidence.shares.drops_m)} starts",
         f"come to rest: {percent(float(rest[0]))} at 12, {percent(float(rest[1]))} at 18, {percent(float(rest[2]))} at "
-        f"20 kN/m; median span at 12 kN/m {millimetres(float(np.median(spans_m[0])))}",
+        f"20 kN/m; median span at 12 kN/m {millimetres(float(np.median(spans_m[0])))}{asked.rest()}",
         bool(rest[0] < 0.5),
         remark,
     )

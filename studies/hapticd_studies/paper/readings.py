@@ -86,6 +86,14 @@ class ReadingTable:
         passed: Array = (self.outcome == Outcome.SETTLED).sum(axis=1)
         return passed
 
+    def rest(self, row: int) -> str:
+        """Medians over the scenarios that a reading passes: how many times the threshold is felt; span of the force."""
+        passed = self.outcome[row] == Outcome.SETTLED
+        if not passed.any():
+            return "-"
+        felt, chatter_n = (self._shaped(each)[row][passed] for each in (self.asked.felt, self.asked.chatter_n))
+        return f"{np.median(felt):.2g}; {np.median(chatter_n):.2g} N"
+
     def failing(self, row: int) -> list[str]:
         """Scenarios in which a reading fails."""
         return [name for name, outcome in zip(self.scenarios, self.outcome[row], strict=True) if outcome]
@@ -104,13 +112,17 @@ class ReadingTable:
                     "outcome": [Outcome(int(outcome)).words for outcome in outcomes],
                     "peak_to_peak_m": [float(span) if np.isfinite(span) else None for span in spans],
                     "damping_n_s_per_m": [float(damping) for damping in dampings],
+                    "felt_index": [float(each) if np.isfinite(each) else None for each in felt],
+                    "force_chatter_n": [float(each) if np.isfinite(each) else None for each in chatter],
                 }
-                for reading, passed, outcomes, spans, dampings in zip(
+                for reading, passed, outcomes, spans, dampings, felt, chatter in zip(
                     self.readings,
                     self.passed,
                     self.outcome,
                     self.peak_to_peak_m,
                     self.damping_n_s_per_m,
+                    self._shaped(self.asked.felt),
+                    self._shaped(self.asked.chatter_n),
                     strict=True,
                 )
             ],

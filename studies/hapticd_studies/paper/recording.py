@@ -119,6 +119,8 @@ class Recording(Run):
             displayed_stiffness_n_per_m=stiffness,
             stiffness_error=error,
             measured_stiffness_n_per_m=measured,
+            felt_index=None if math.isnan(self.felt_index) else self.felt_index,
+            force_chatter_n=self.force_chatter_n,
             imperceptible=bool(
                 self.peak_to_peak_m < still_m * (1.0 + 1e-9)
                 and not grows
@@ -157,6 +159,8 @@ class RunFigures:
         displayed_stiffness_n_per_m: mean force over mean true depth.
         stiffness_error: its relative error.
         measured_stiffness_n_per_m: the same over the measured depth: the wall's own by construction, once at rest.
+        felt_index: how many times the threshold of a hand the true position vibrates; None where it diverged.
+        force_chatter_n: span of the applied force [N].
         imperceptible: vibration below two counts or 10 um and not growing, stiffness within the JND of 23 %.
     """
 
@@ -176,7 +180,15 @@ class RunFigures:
     displayed_stiffness_n_per_m: float | None
     stiffness_error: float | None
     measured_stiffness_n_per_m: float | None
+    felt_index: float | None
+    force_chatter_n: float
     imperceptible: bool
+
+    @property
+    def rest(self) -> str:
+        """What of the end is felt, in words."""
+        felt = "" if self.felt_index is None else f"felt {self.felt_index:.2g} times the threshold, "
+        return f"{felt}force spans {self.force_chatter_n:.2g} N"
 
     def declared(self) -> dict[str, Any]:
         """For a file of results."""

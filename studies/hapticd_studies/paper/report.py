@@ -134,7 +134,8 @@ def _runs(evidence: Evidence) -> str:
         ("recovered", "mJ"),
         ("generated", "mJ"),
         ("stiffness", "true, error"),
-        ("felt", "as still"),
+        ("felt", "of threshold; force spans, N"),
+        ("coarsely", "still"),
     )
     head = "".join(f'<th class="number">{title}<br><span class="small">{unit}</span></th>' for title, unit in titles)
     rows = [
@@ -150,9 +151,10 @@ def _runs(evidence: Evidence) -> str:
         '<p class="small">Settled: since when the true position stays within 5 % of its depth, or three counts. '
         "Injected and recovered: all energy into the wall and all that came back; generated: what sampling and hold "
         "made of it. Stiffness: mean force over mean true depth of the last 0.5 s; over the measured depth it equals "
-        "the wall's own by construction at rest. Felt as still: it vibrates by less than two counts or 10 um, the "
-        "vibration does not grow, and the stiffness is within the 23 % that people can tell apart (thresholds from the "
-        "literature, for tens of hertz; near 250 Hz people feel less than a micrometre). "
+        "the wall's own by construction at rest. Felt: how many times the threshold of a hand with a pen the true "
+        "position vibrates in the last 0.5 s, band by band, and by how much the force swings then. Coarsely still: it "
+        "vibrates by less than two counts or 10 um, the vibration does not grow, and the stiffness is within the 23 % "
+        "that people can tell apart (for tens of hertz; near 250 Hz people feel less than a micrometre). "
         "Each run is in <code>scenarios/</code> as a configuration for <code>hapticd simulate</code>.</p>"
     )
 
@@ -171,6 +173,7 @@ def _cells(figures: RunFigures) -> list[str]:
         f"{figures.energy_recovered_j * 1e3:.1f}",
         f"{figures.generated_j * 1e3:.2f}",
         f"{figures.displayed_stiffness_n_per_m:.0f} N/m, {figures.stiffness_error:+.1%}" if at_rest else "–",
+        f"{'–' if figures.felt_index is None else f'{figures.felt_index:.2g}'}; {figures.force_chatter_n:.2g}",
         "yes" if figures.imperceptible else "no",
     ]
 
@@ -185,11 +188,14 @@ def _readings(evidence: Evidence) -> str:
         damping = _short(float(np.abs(table.damping_n_s_per_m[at]).max()))
         rows.append(
             f"<tr><td>{_text(reading.name)}</td><td class='number'>{passed}</td>"
+            f"<td class='number'>{_text(table.rest(at))}</td>"
             f"<td class='number'>{_text(millimetres(float(spans.max())))}</td><td class='number'>{damping}</td>"
             f"<td class='remark'>{_text(shown)}</td></tr>"
         )
     head = (
-        "<tr><th>reading</th><th class='number'>settled of 28</th><th class='number'>widest span</th>"
+        "<tr><th>reading</th><th class='number'>settled of 28</th>"
+        "<th class='number'>felt; force spans<br><span class='small'>of those, medians</span></th>"
+        "<th class='number'>widest span</th>"
         "<th class='number'>largest α at the end<br><span class='small'>N s/m</span></th><th>not settled</th></tr>"
     )
     return f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'

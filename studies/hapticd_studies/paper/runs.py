@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from hapticd import plugins
+from hapticd.offline.felt import WINDOW_S
 from hapticd.offline.outcome import Criterion, Outcome
 from hapticd.offline.presses import aimed, judge
 from hapticd.simulation.batch import Batch, BatchResult, Point
+from hapticd_studies.felt_ends import felt_ends
 
 Array = np.ndarray[Any, Any]
 
@@ -21,6 +23,8 @@ law_named = cache(plugins.law)
 
 FEW_TICKS = 400_000
 """So few are run interpreted: compiling a law takes as long."""
+
+_AT_ONCE = 1000  # the last second of a point takes 50 kB
 
 
 @dataclass(slots=True)
@@ -31,6 +35,7 @@ class Asked:
         points: the loops.
         outcome: the verdict on each, by the criterion of every study.
         peak_to_peak_m, damping_n_s_per_m, settled_s: as in `BatchResult`.
+        felt, chatter_n: felt index of the last second, and the span of the force in it [N].
     """
 
     points: Sequence[Point]
@@ -38,6 +43,20 @@ class Asked:
     peak_to_peak_m: Array = field(default_factory=lambda: np.empty(0))
     damping_n_s_per_m: Array = field(default_factory=lambda: np.empty(0))
     settled_s: Array = field(default_factory=lambda: np.empty(0))
+    felt: Array = field(default_factory=lambda: np.empty(0))
+    chatter_n: Array = field(default_factory=lambda: np.empty(0))
+
+    def rest(self, among: Array | None = None) -> str:
+        """What of those that came to rest is felt, in words; empty where none did.
+
+        Args:
+            among: true or false, a value a point: only of these.
+        """
+        settled = self.settled if among is None else self.settled & among
+        if not settled.any():
+            return ""
+        felt, chatter_n = self.felt[settled], self.chatter_n[settled]
+        return f", felt {np.median(felt):.2g} times the threshold, force spans {np.median(chatter_n):.2g} N (medians)"
 
     @property
     def settled(self) -> Array:
@@ -82,22 +101,43 @@ class Runs:
         """
         for law, every in self._asked.items():
             points = [point for asked in every for point in asked.points]
-            result = _result(law, points, duration_s, progress)
-            outcome = judge(Criterion(), points, result)
+            few = sum(duration_s / point.period_s for point in points) <= FEW_TICKS
+            parts = [
+                _columns(law, points[first : first + _AT_ONCE], duration_s, few, progress)
+                for first in range(0, len(points), _AT_ONCE)
+            ]
+            columns = [np.concatenate(each) for each in zip(*parts, strict=True)]
             first = 0
             for asked in every:
                 part = slice(first, first + len(asked.points))
                 first = part.stop
-                asked.outcome = outcome[part]
-                asked.peak_to_peak_m = np.where(result.finite, result.peak_to_peak_m, np.inf)[part]
-                asked.damping_n_s_per_m = result.damping_n_s_per_m[part]
-                asked.settled_s = result.settled_s[part]
+                (
+                    asked.outcome,
+                    asked.peak_to_peak_m,
+                    asked.damping_n_s_per_m,
+                    asked.settled_s,
+                    asked.felt,
+                    asked.chatter_n,
+                ) = (column[part] for column in columns)
 
 
-def _result(law: str, points: Sequence[Point], duration_s: float, progress: Callable[[int], None]) -> BatchResult:
-    batch = Batch(law_named(law), points, duration_s, Criterion().window_s)
-    if sum(duration_s / point.period_s for point in points) <= FEW_TICKS:
-        result = batch.run_interpreted()
-        progress(len(points))
-        return result
-    return batch.run(progress=progress)
+def _columns(
+    law: str, points: Sequence[Point], duration_s: float, few: bool, progress: Callable[[int], None]
+) -> tuple[Array, ...]:
+    batch = Batch(law_named(law), points, duration_s, Criterion().window_s, trace_every=1, trace_last_s=WINDOW_S)
+    result = _result(batch, few, progress)
+    return (
+        judge(Criterion(), points, result),
+        np.where(result.finite, result.peak_to_peak_m, np.inf),
+        result.damping_n_s_per_m,
+        result.settled_s,
+        *felt_ends(points, result),
+    )
+
+
+def _result(batch: Batch, few: bool, progress: Callable[[int], None]) -> BatchResult:
+    if not few:
+        return batch.run(progress=progress)
+    result = batch.run_interpreted()
+    progress(len(result.finite))
+    return result

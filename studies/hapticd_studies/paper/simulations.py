@@ -94,7 +94,7 @@ def _converges(evidence: Evidence, key: str, source: str, text: str, names: tupl
     for name in names:
         figures = evidence.figures[name]
         when = "never" if figures.settled_s is None else f"{figures.settled_s:.2f} s, {figures.cycles_to_settle} cycles"
-        parts.append(f"{name}: {when}, {figures.damping_n_s_per_m:.1f} N s/m")
+        parts.append(f"{name}: {when}, {figures.damping_n_s_per_m:.1f} N s/m, {figures.rest}")
     return Claim(
         key,
         source,

@@ -33,8 +33,8 @@ def readings_table(table: ReadingTable) -> str:
     """A line a reading that does not settle everything, and the first, which is the shipped one."""
     count = len(table.scenarios)
     rows = [
-        f"| {reading.name} | {passed} |"
+        f"| {reading.name} | {passed} | {table.rest(at)} |"
         for at, (reading, passed) in enumerate(zip(table.readings, table.passed.tolist(), strict=True))
         if at == 0 or passed < count
     ]
-    return "\n".join([f"| reading | settled of {count} |", "|---|---|", *rows, ""])
+    return "\n".join([f"| reading | settled of {count} | felt; force spans |", "|---|---|---|", *rows, ""])

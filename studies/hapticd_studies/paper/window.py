@@ -22,6 +22,7 @@ _STABLE = 0.95
 
 _COUNT_N = WINDOW_N_PER_M * 1e-5
 """Force of one count of the position on that wall [N]."""
+_LENGTHS = (len(WINDOW_DEVICES), len(WINDOW_READINGS), len(NOISES_M), 2, len(WINDOW_HANDS_N))
 
 
 def claims(evidence: Evidence) -> list[Claim]:
@@ -79,7 +80,10 @@ def _literal_remark(evidence: Evidence) -> str:
 
 
 def _needed(evidence: Evidence, key: str, reading: str, name: str, remark: str) -> Claim:
-    shares = window_shares(evidence)[:, list(WINDOW_READINGS).index(name)]
+    at = list(WINDOW_READINGS).index(name)
+    shares, window = window_shares(evidence)[:, at], evidence.shares.window
+    among = np.zeros((*_LENGTHS, len(evidence.shares.window_drops_m)), dtype=bool)
+    among[:, at, :, 1] = True
     without, with_window = float(shares[:, :, 0].mean()), float(shares[:, :, 1].mean())
     return Claim(
         key,
@@ -89,7 +93,7 @@ def _needed(evidence: Evidence, key: str, reading: str, name: str, remark: str) 
         f"{len(evidence.shares.window_drops_m)} starts each; sensor noise of "
         f"{', '.join(f'{noise * 1e6:g}' for noise in NOISES_M)} um; {' and '.join(WINDOW_DEVICES)}",
         f"come to rest: {percent(without)} without the window, {percent(with_window)} with it; with it "
-        f"{_decides(shares)}",
+        f"{_decides(shares)}{window.rest(among.ravel())}",
         without < 0.5 and with_window >= _STABLE,
         remark,
     )
@@ -133,7 +137,7 @@ def _larger(evidence: Evidence) -> Claim:
         "A larger window lengthens convergence",
         f"{' and '.join(f'{k * 1e-3:g}' for k in WINDOWS_N_PER_M)} kN/m, windows of {WINDOWS[0]} to {WINDOWS[-1]} on "
         f"either side, {', '.join(f'{-hand:g}' for hand in HANDS_N)} N, {len(evidence.shares.drops_m)} starts each",
-        f"median time to settle, and share that does: {'; '.join(parts)}",
+        f"median time to settle, and share that does: {'; '.join(parts)}{windows.rest()}",
         never_sooner and bool((medians_s[:, -1] > 1.1 * medians_s[:, 0]).all()),
         "Small windows cost nothing. One that is about as long as half a swing, 14 ms at 12 kN/m and 11 ms at 20, "
         "hardly sees a cycle.",
@@ -143,5 +147,4 @@ def _larger(evidence: Evidence) -> Claim:
 def window_shares(evidence: Evidence) -> Array:
     """Share that comes to rest, [device, reading, noise, without or with the window, hand]."""
     window = evidence.shares.window
-    lengths = (len(WINDOW_DEVICES), len(WINDOW_READINGS), len(NOISES_M), 2, len(WINDOW_HANDS_N))
-    return window.shares(window.settled, *lengths)
+    return window.shares(window.settled, *_LENGTHS)
