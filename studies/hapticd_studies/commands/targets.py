@@ -30,7 +30,7 @@ def command(
         typer.Option("--missed", help="What reaches each target that ring-damping misses, and what that loses."),
     ] = False,
     also: Annotated[
-        str, typer.Option(help="Targets that stand in missed.md although few devices let them be reached: words.")
+        str, typer.Option(help="Words of targets that missed.md has even where the first law reaches them.")
     ] = "tremor,unfelt",
     output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("targets"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
