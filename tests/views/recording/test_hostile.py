@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import msgpack
 import pytest
 
-from hapticd.telemetry.records import Event, Position
+from hapticd.client import DaemonClient, RefusedKeyError
+from hapticd.errors import ConfigError
+from hapticd.telemetry.records import Event, Position, Record
+from hapticd.telemetry.wire import Topic
 from hapticd_views.recording import read
+from hapticd_views.recording.recorder import Limits, Recorder
 from tests.views.recording.made import STATUS, Publisher, Recording
 
 HOSTILE = [
@@ -107,6 +113,55 @@ def test_a_daemon_of_another_schema_ends_it(publisher: Publisher, tmp_path: Path
     assert made.complete
     assert "speaks schema 2" in made.notes[-1].text
     assert len(made.topics["position"]["seq"]) > 300
+
+
+def test_a_key_that_is_taken_from_the_list_ends_it_with_a_complete_file(publisher: Publisher, tmp_path: Path) -> None:
+    path = tmp_path / "key.mcap"
+    told: list[Position | None] = [*(position(seq) for seq in range(50)), None]
+
+    class Struck(DaemonClient):
+        """The daemon lets it in no more, as after `hapticd keys remove` and a reload."""
+
+        def receive(self, timeout_s: float | None = 0.0) -> list[Record]:
+            record = told.pop(0)
+            if record is None:
+                raise RefusedKeyError("does not let your key in")
+            return [record]
+
+    with connected(publisher, Struck) as daemon, pytest.raises(RefusedKeyError):
+        Recorder(daemon, path, Limits()).run(lambda: False)
+    made = read(path)
+    assert made.complete
+    assert "does not let your key in" in made.notes[-1].text
+    assert len(made.topics["position"]["seq"]) == 50
+
+
+def test_no_file_of_an_older_recording_ends_one_whose_files_follow_each_other(
+    publisher: Publisher, tmp_path: Path
+) -> None:
+    taken = tmp_path / "long-007.mcap"
+    taken.write_bytes(b"of an older one")
+    with connected(publisher, DaemonClient) as daemon:
+        with pytest.raises(ConfigError, match=r"long-007\.mcap: exists, and would be one of the files"):
+            Recorder(daemon, tmp_path / "long.mcap", Limits(duration_s=60.0)).run(lambda: True)
+        assert [path for path in tmp_path.iterdir() if path.suffix == ".mcap"] == [taken]
+        Recorder(daemon, tmp_path / "long.mcap", Limits()).run(lambda: True)
+    assert read(tmp_path / "long.mcap").complete
+
+
+@contextlib.contextmanager
+def connected(publisher: Publisher, kind: type[DaemonClient]) -> Iterator[DaemonClient]:
+    """A client of this kind that has its first status."""
+
+    def say_status() -> None:
+        publisher.await_subscriber()
+        publisher.say(STATUS)
+
+    saying = threading.Thread(target=say_status)
+    saying.start()
+    with kind("default", publisher.endpoint, None, None, tuple(Topic), None, 1000) as daemon:
+        saying.join()
+        yield daemon
 
 
 def test_a_message_that_is_too_large_is_never_taken_in(publisher: Publisher, tmp_path: Path) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hapticd.client import DaemonClient
-from hapticd.errors import HapticdError, SchemaError, WireError
+from hapticd.client import DaemonClient, RefusedKeyError
+from hapticd.errors import ConfigError, HapticdError, SchemaError, WireError
 from hapticd.telemetry.records import Gap, Position, Record, Status, Tick
 from hapticd.telemetry.wire import Topic
 from hapticd_views.recording.file import RecordingFile
@@ -115,11 +116,13 @@ class Recorder:
             tell: hears of the progress with every chunk.
 
         Raises:
-            ConfigError: the file cannot be created.
+            ConfigError: the file cannot be created, or one of those that may follow it is there.
             DiskError: the disk does not take any more; what was recorded is readable.
+            RefusedKeyError: the daemon does not list this key any more; the file is complete.
             SchemaError: the daemon was replaced by one whose schema is not known; the file is complete.
         """
         began_s = self._synced_s = time.monotonic()
+        self._refuse_taken()
         self._begin_file()
         try:
             while not stopped() and (duration_s is None or time.monotonic() - began_s < duration_s):
@@ -132,13 +135,25 @@ class Recorder:
                         tell(self.progress)
                 self._rotate(now_s)
             self._catch_up()
-        except SchemaError as error:
+        except (SchemaError, RefusedKeyError) as error:
             self._note(str(error))
             self._end_file()
             raise
         self._note("recording stopped")
         self._end_file()
         return self.progress
+
+    def _refuse_taken(self) -> None:
+        """A file of an older recording would end this one when its turn comes, hours later perhaps."""
+        if not self._limits.rotate or self._overwrite or not self._output.parent.is_dir():
+            return
+        like = re.compile(rf"{re.escape(self._output.stem)}-\d{{3,}}{re.escape(self._output.suffix)}")
+        taken = sorted(path.name for path in self._output.parent.iterdir() if like.fullmatch(path.name))
+        if taken:
+            raise ConfigError(
+                f"{self._output.with_name(taken[0])}: exists, and would be one of the files; name another --output, or "
+                "add --overwrite"
+            )
 
     def _begin_file(self) -> None:
         number = len(self.progress.files) + 1
