@@ -160,6 +160,31 @@ def test_a_file_that_holds_no_run_says_so(name: str, content: bytes | None, said
     assert name in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"t_s": np.float64(1.0), "x_m": np.float64(0.0), "force_n": np.float64(0.0)}, "t_s is no column"),
+        ({"t_s": np.zeros((3, 2)), "x_m": np.zeros(3), "force_n": np.zeros(3)}, "t_s is no column"),
+    ],
+)
+def test_arrays_that_are_no_columns_are_no_run(columns: dict[str, Any], said: str, tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", **columns)
+    with pytest.raises(HapticdError, match=said):
+        open_source(tmp_path / "run.npz")
+
+
+def test_a_file_of_columns_that_is_damaged_inside_or_another_kind_of_numpy_is_none(tmp_path: Path) -> None:
+    np.save(tmp_path / "one.npy", np.arange(3.0))
+    (tmp_path / "one.npy").rename(tmp_path / "one.npz")
+    np.savez_compressed(tmp_path / "packed.npz", t_s=np.arange(500.0))
+    packed = bytearray((tmp_path / "packed.npz").read_bytes())
+    packed[80:120] = b"\xff" * 40
+    (tmp_path / "packed.npz").write_bytes(packed)
+    for name in ("one.npz", "packed.npz"):
+        with pytest.raises(HapticdError, match=r"is no \.npz file of numbers"):
+            open_source(tmp_path / name)
+
+
 def test_a_pickle_in_a_file_of_columns_is_not_run(tmp_path: Path) -> None:
     """An .npz from a stranger: numpy runs what a pickle says when it is allowed to."""
     target = tmp_path / "done"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,11 @@ from hapticd_views.recording.recorder import Limits, Recorder
 
 SUFFIXES = (".mcap", ".csv", ".npz")
 """What a file may end in."""
+
+# What numpy and zipfile raise for one that is damaged, locked, packed otherwise, or none but in name.
+_NO_NPZ = (
+    ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError, TypeError, NotImplementedError, RuntimeError,
+)  # fmt: skip
 
 Columns = dict[str, npt.NDArray[Any]]
 
@@ -64,7 +70,11 @@ def table(path: Path) -> Columns:
     Raises:
         HapticdError: it cannot be read, or is none.
     """
-    return _csv(path) if path.suffix == ".csv" else _npz(path)
+    columns = _csv(path) if path.suffix == ".csv" else _npz(path)
+    for name, column in columns.items():
+        if np.ndim(column) != 1:
+            raise HapticdError(f"{path}: is no table of numbers: {name} is no column")
+    return columns
 
 
 def recorded(name: str, recording: Recording) -> Source:
@@ -158,5 +168,5 @@ def _npz(path: Path) -> Columns:
             return {name: found[name] for name in found.files}
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+    except _NO_NPZ as error:
         raise HapticdError(f"{path}: is no .npz file of numbers: {error}") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ from hapticd.plugins import CONTROLLERS, names
 from hapticd.simulation.options import SimulationOptions
 from hapticd_views.recording import read
 from hapticd_views.replay.hand import identify
+from hapticd_views.replay.motion import replay_motion
 from hapticd_views.replay.replay import Replay, replay
+from hapticd_views.replay.stretch import longest_stretch
 from tests.daemon.running import HAPTICD
 from tests.views.replay.simulated import record
 
@@ -139,6 +142,19 @@ def test_the_longest_stretch_without_a_gap_is_replayed(tmp_path: Path) -> None:
     assert not made.in_contact
     short = replay(tmp_path / "run.mcap", laws=["none"], hand="motion", duration_s=0.3)
     assert short.duration_s == pytest.approx(0.301)
+
+
+def test_a_part_is_replayed_on_its_own_axes_where_another_part_has_more(tmp_path: Path) -> None:
+    """As when the daemon came back with another device: the columns are as wide as the widest part."""
+    config = pressed("none", 6000.0)
+    record(tmp_path / "run.mcap", config, 400)
+    recording = read(tmp_path / "run.mcap")
+    alone = longest_stretch(recording)
+    names = ("position_m", "velocity_m_per_s", "force_n", "force_requested_n")
+    position = recording.topics["position"]
+    wide = {name: np.pad(position[name], ((0, 0), (0, 2)), constant_values=np.nan) for name in names}
+    beside = longest_stretch(replace(recording, topics={**recording.topics, "position": {**position, **wide}}))
+    assert replay_motion(beside, config).force_n == replay_motion(alone, config).force_n
 
 
 def test_a_recording_of_a_real_device_needs_a_model_or_replays_its_motion(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from hapticd.errors import HapticdError
 from hapticd_views.recording import Recording
 
 _FAR_M = 1e6
+_ALONG_AXES = ("position_m", "velocity_m_per_s", "force_n", "force_requested_n")
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +104,14 @@ def longest_stretch(recording: Recording, most_s: float | None = None) -> Stretc
     start += 0 if inside else int(free[0])
     if most_s is not None:
         end = min(end, start + max(2, 1 + round(most_s * recording.receipt["rate_hz"])))
+    receipt = receipts[int(in_force[start])]
+    axes = len(receipt["axes"])  # another part may be of a device with more
     return Stretch(
-        ticks={name: column[start:end] for name, column in ticks.items()},
-        receipt=receipts[int(in_force[start])],
+        ticks={
+            name: column[start:end, :axes] if name in _ALONG_AXES else column[start:end]
+            for name, column in ticks.items()
+        },
+        receipt=receipt,
         first_s=float(ticks["timestamp"][start] - ticks["timestamp"][0]),
         in_contact=inside,
     )
