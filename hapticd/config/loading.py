@@ -45,7 +45,8 @@ class LoadedConfig:
         port_law: the module of the law that couplings and forces are under.
         port_params: that law's parameters.
         path: the file; what errors call it when it was no file.
-        text: what the file said; `parse(text, str(path))` gives this configuration again in another process.
+        text: what the file said; `parse(text, str(path), folder)` gives this configuration again in another process.
+        folder: where files lie that it names without their whole path.
     """
 
     config: Config
@@ -57,6 +58,7 @@ class LoadedConfig:
     port_params: LawParams
     path: Path
     text: str
+    folder: Path
 
     @property
     def sha256(self) -> str:
@@ -79,7 +81,7 @@ class LoadedConfig:
             ConfigError: a key that has no place, or a value that cannot be used; names the key.
         """
         name = str(self.path)
-        return parse(with_values(self.text, name, values), name)
+        return parse(with_values(self.text, name, values), name, self.folder)
 
     def __repr__(self) -> str:
         device, law = self.config.device.driver, self.config.controller.law
@@ -100,12 +102,13 @@ def load(source: Path | str) -> LoadedConfig:
     return parse(read(source), str(source))
 
 
-def parse(text: str, name: str) -> LoadedConfig:
+def parse(text: str, name: str, folder: Path | None = None) -> LoadedConfig:
     """Check the text of a configuration.
 
     Args:
         text: TOML.
         name: what to call it in errors, usually its path.
+        folder: where files lie that it names without their whole path; None: that of its name.
 
     Raises:
         ConfigError: it cannot be used; carries every problem, one line each.
@@ -127,8 +130,9 @@ def parse(text: str, name: str) -> LoadedConfig:
         raise ConfigError(*problems.lines)
     if law is None or params is None or port_law is None or port_params is None:
         raise ConfigError(*problems.lines)
-    files = _with_files(config, Path(name).parent)
-    return LoadedConfig(files, driver, options, law, params, port_law, port_params, Path(name), text)
+    folder = Path(name).parent if folder is None else folder
+    files = _with_files(config, folder)
+    return LoadedConfig(files, driver, options, law, params, port_law, port_params, Path(name), text, folder)
 
 
 def _toml(text: str, name: str) -> dict[str, Any]:

@@ -16,14 +16,17 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
 from hapticd.errors import ConfigError, HapticdError
+from hapticd.paths import directory
 from hapticd.telemetry.records import Sent
 from hapticd.telemetry.wire import Topic
 from hapticd_views.recording import read
 from hapticd_views.recording.file import DiskError, RecordingFile
 from hapticd_views.recording.messages import TELEMETRY, schema_of
+from hapticd_views.recording.receipt import METADATA, as_texts, make_receipt
 from hapticd_views.recording.repair import repair
+from hapticd_views.replay.stretch import Stretch
 from tests.examples import examples
-from tests.views.recording.made import files_up_to, make
+from tests.views.recording.made import ANSWER, STATUS, files_up_to, make
 
 TICKS, CHUNK_TICKS = 300, 40
 
@@ -234,3 +237,19 @@ def check_full(path: Path, limit: int) -> None:
     assert path.stat().st_size > limit - 2 * size_of_chunk
     assert len(recording.ticks["seq"]) % 40 == 0
     assert len(recording.ticks["seq"]) > 0
+
+
+def test_what_its_configuration_names_beside_itself_is_looked_for_there_and_not_beside_the_recording(
+    tmp_path: Path,
+) -> None:
+    text = (directory("config") / "mesh.toml").read_text()
+    told = {**ANSWER, "config_text": text, "config_file": "/lab/mesh.toml"}
+    file = RecordingFile(tmp_path / "press.mcap")
+    file.describe(METADATA, as_texts(make_receipt(STATUS, told)))
+    file.close()
+    recording = read(tmp_path / "press.mcap")
+    for config in (recording.config, Stretch({}, recording.receipt, 0.0, False).config):
+        other = config.with_values({"controller.law": "tdpa"})  # as a replay has it
+        assert [each.config.scene.objects[0].model_dump()["file"] for each in (config, other)] == 2 * [
+            "/lab/ring.field"
+        ]

@@ -63,7 +63,8 @@ class Recording:
         """
         if not self.receipt["config_text"]:
             raise HapticdError(f"{self.path}: has no configuration: {self.receipt['config_missing']}")
-        return parse(self.receipt["config_text"], f"{self.path}: {Path(self.receipt['config_file']).name}")
+        file = Path(self.receipt["config_file"])
+        return parse(self.receipt["config_text"], f"{self.path}: {file.name}", file.parent)
 
     @property
     def missing(self) -> int:

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,8 @@ class Stretch:
             raise HapticdError(
                 f"the recording has no configuration ({self.receipt['config_missing']}): name a --config"
             )
-        return parse(self.receipt["config_text"], "recorded configuration")
+        folder = Path(self.receipt["config_file"]).parent
+        return parse(self.receipt["config_text"], "recorded configuration", folder)
 
     @property
     def info(self) -> DeviceInfo:
