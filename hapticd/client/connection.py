@@ -69,6 +69,8 @@ class Client:
         self._timeout_s = timeout_s
         self._ahead: deque[Record] = deque()  # arrived with what was asked for, and not yet taken
         self._last: dict[Topic, int] = {}
+        self._anew: set[Topic] = set()  # their next tick is the first that is here of a daemon that was started anew
+        self._back: set[Topic] = set()  # they have counted from the beginning before its status came
         key = client_keys(self.endpoint, keys)
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.SUB)
@@ -209,18 +211,28 @@ class Client:
                 f"{self.endpoint}: hapticd {status.version} there speaks schema {status.schema}, this "
                 f"client {SCHEMA}; install the release that the daemon runs"
             )
-        if self.latest_status is not None and status.every_ticks != self.latest_status.every_ticks:
+        before, self.latest_status = self.latest_status, status
+        if before is None:
+            return
+        if status.every_ticks != before.every_ticks:
             self._last.clear()
-        self.latest_status = status
+        if status.started_timestamp != before.started_timestamp:
+            self._anew = self._last.keys() - self._back
+            self._back.clear()
 
     def _gap(self, topic: Topic, seq: int) -> list[Gap]:
         last = self._last.get(topic)
         self._last[topic] = seq
         step = self.latest_status.every_ticks if self.latest_status is not None else 1
+        if topic in self._anew:  # it may have counted past the last one already
+            self._anew.discard(topic)
+            return [Gap(topic, last, seq, 0)] if last is not None else []
         if last is None or seq == last + step:
             return []
         missing = max(0, (seq - last) // step - 1) if seq > last else 0
-        if seq > last and missing == 0:
+        if seq <= last:
+            self._back.add(topic)
+        elif missing == 0:
             return []
         self.missing[topic] += missing
         return [Gap(topic, last, seq, missing)]

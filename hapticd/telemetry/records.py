@@ -241,7 +241,7 @@ class Gap:
         topic: of those ticks.
         after: last tick before the gap.
         seq: first tick after it.
-        missing: ticks in between; 0 when the daemon started anew and counts from the beginning.
+        missing: ticks in between; 0 when the daemon started anew and counts from the beginning, perhaps past `after`.
     """
 
     topic: Topic

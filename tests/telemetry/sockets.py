@@ -76,11 +76,11 @@ class Wire:
         socket.connect(endpoint)
         return socket
 
-    def restart(self) -> None:
+    def restart(self, **status: Any) -> None:
         """Close the publisher and start another in its place, as a restarted daemon would."""
         self.publisher.close()
         self.publisher = Publisher(self.config, self.path, self.inputs, EPOCH_OFFSET_NS)
-        self.publisher.status(Status(version="1.2.3").as_map())
+        self.publisher.status(Status(version="1.2.3", **status).as_map())
 
 
 class Subscriber:

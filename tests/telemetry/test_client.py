@@ -207,6 +207,30 @@ def test_a_restarted_daemon_is_found_again_and_counts_anew() -> None:
         assert client.missing[Topic.POSITION] == 0
 
 
+def test_a_restarted_daemon_that_has_counted_further_has_lost_nothing() -> None:
+    """As when the network took longer to come back than the daemon before had run."""
+    with Wire() as wire, heard(wire, Position) as client:
+        wire.publisher.publish(ticks(20, first=500))
+        take(client, 20)
+        wire.restart(started_timestamp=2.0)
+        joined(client, wire, 2)
+        wire.publisher.publish(ticks(40, first=3000))
+        gap, *after = take(client, 41)
+        assert gap == Gap(Topic.POSITION, 519, 3000, 0)
+        assert not any(isinstance(one, Gap) for one in after)
+        assert client.missing[Topic.POSITION] == 0
+
+
+def test_a_restart_is_told_once_though_ticks_come_before_the_status() -> None:
+    with Wire() as wire, heard(wire, Position) as client:
+        wire.publisher.publish(ticks(20, first=500))
+        wire.publisher.publish(ticks(20))
+        wire.publisher.status(Status(version="1.2.3", started_timestamp=2.0).as_map())
+        wire.publisher.publish(ticks(20, first=20))
+        gaps = [one for one in take(client, 61) if isinstance(one, Gap)]
+        assert gaps == [Gap(Topic.POSITION, 519, 0, 0)]
+
+
 def test_a_client_may_come_before_the_daemon() -> None:
     with Wire() as wire:
         wire.publisher.close()

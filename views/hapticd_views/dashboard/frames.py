@@ -63,8 +63,7 @@ class TickJoiner:
 
     def restart(self, gap: Gap) -> None:
         """A daemon that was started anew counts from the beginning: what waits of the one before is complete."""
-        middle = (gap.after + gap.seq) / 2
-        for seq in [seq for seq in self._waiting if seq > middle]:
+        for seq in [seq for seq in self._waiting if abs(seq - gap.after) <= abs(seq - gap.seq)]:
             del self._waiting[seq]
 
     def take(self) -> list[Tick]:
