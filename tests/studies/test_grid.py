@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -116,6 +117,35 @@ def test_a_line_that_was_cut_off_is_dropped_and_those_before_it_count(tmp_path: 
         again.keep(5, [[1.0]])
         again.close()
         assert sorted(read(path, "study")) == [*found, 5]
+
+
+def test_a_full_disk_is_one_line_and_what_was_done_before_counts(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    rows = [[0.1] * 100]
+
+    def fill() -> None:
+        with kept(job(tmp_path, 3.0), path) as journal:
+            for block in range(BLOCKS):
+                journal.keep(block, rows)
+
+    with disk_of(5000), pytest.raises(HapticdError, match=r"cannot be written: .*finished cells are kept") as raised:
+        fill()
+    assert str(raised.value).startswith(f"{path}: ")
+    with kept(job(tmp_path, 3.0), path) as journal:
+        assert sorted(journal.done) == list(range(len(journal.done)))
+        assert len(journal.done) > 5
+        assert set(map(str, journal.done.values())) == {str(rows)}
+
+
+@contextmanager
+def disk_of(size: int) -> Iterator[None]:
+    """No file gets larger [bytes]."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_unfinished_work_of_another_study_is_neither_used_nor_thrown_away(tmp_path: Path) -> None:

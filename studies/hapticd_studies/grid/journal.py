@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 from pathlib import Path
 from typing import Any
 
-from hapticd.errors import ConfigError, InstanceError
+from hapticd.errors import ConfigError, HapticdError, InstanceError
 
 Row = list[float]
 
@@ -28,6 +29,7 @@ class Journal:
 
     Raises:
         ConfigError: the file cannot be written, or it belongs to another study.
+        HapticdError: the disk is full.
         InstanceError: another process is at work on it.
     """
 
@@ -49,11 +51,15 @@ class Journal:
                 self._file.truncate(0)
             self._read(fingerprint)
         except BaseException:
-            self._file.close()
+            self._let_go()
             raise
 
     def keep(self, block: int, rows: list[Row]) -> None:
-        """Enter a finished block."""
+        """Enter a finished block.
+
+        Raises:
+            HapticdError: the disk is full; the blocks before this one count.
+        """
         self.done[block] = rows
         self._write({"block": block, "rows": rows})
 
@@ -61,12 +67,12 @@ class Journal:
         """Leave the file for another time if there is something in it; twice is as good as once."""
         if not self.done and not self._file.closed:
             self.path.unlink(missing_ok=True)
-        self._file.close()
+        self._let_go()
 
     def remove(self) -> None:
         """The study is complete and its output written."""
         self.path.unlink(missing_ok=True)
-        self._file.close()
+        self._let_go()
 
     def _read(self, fingerprint: str) -> None:
         self._file.seek(0)
@@ -96,5 +102,15 @@ class Journal:
             self._write({"study": fingerprint})
 
     def _write(self, entry: dict[str, Any]) -> None:
-        self._file.write(json.dumps(entry, separators=(",", ":")).encode() + b"\n")
-        self._file.flush()
+        try:
+            self._file.write(json.dumps(entry, separators=(",", ":")).encode() + b"\n")
+            self._file.flush()
+        except OSError as error:
+            raise HapticdError(
+                f"{self.path}: cannot be written: {error.strerror}; finished cells are kept, the same command goes on "
+                "from there"
+            ) from error
+
+    def _let_go(self) -> None:
+        with contextlib.suppress(OSError):  # what the disk did not take is tried once more, and was told
+            self._file.close()
