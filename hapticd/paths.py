@@ -125,8 +125,6 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
     """
     whose, plain = _named(instance)
     given = named_directory("RUNTIME", plain)
-    if given is not None:
-        return given / name
     places = instance_directories(instance)
     living, there, closed = [], [], None
     for directory in places:
@@ -140,6 +138,10 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
                 there.append(directory)
         except PermissionError:
             closed = directory
+    if given is not None:
+        if closed is not None:
+            raise InstanceError(f"{closed}: not open to you, and it is the one that $HAPTICD_RUNTIME_DIR names")
+        return given / name
     if len(living) > 1:
         raise InstanceError(
             f"two daemons run as {plain!r}, the system's in {living[0]} and your own in {living[1]}: say which with "

@@ -195,3 +195,21 @@ def test_a_directory_that_cannot_be_made_is_one_line(user: Path, monkeypatch: py
 def test_a_name_that_is_no_directory_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="instance = "):
         runtime_directory(name)
+
+
+def test_a_directory_that_the_environment_names_and_that_is_closed_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended as a defect in a command, and as a daemon that does not run in a subscription."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path / "lab"))
+    sockets_of(tmp_path / "lab" / "left")
+    (tmp_path / "lab").chmod(0o000)
+    before = os.geteuid()
+    if before == 0:
+        os.seteuid(65534)
+    try:
+        with pytest.raises(InstanceError, match=r"lab/left: not open to you"):
+            locate("telemetry", "left")
+    finally:
+        os.seteuid(before)
+        (tmp_path / "lab").chmod(0o700)
