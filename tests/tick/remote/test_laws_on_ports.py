@@ -40,7 +40,10 @@ def test_a_cycle_ends_each_time_the_spring_has_swung_through_the_target() -> Non
     for n in range(1000):
         rig.say("tool", position_m=[0.0])
         rig.go([2e-3 * (abs(n % 200 - 100) - 50) / 50.0])
-    assert rig["tool"].books.ledger.cycle == pytest.approx(10, abs=1)
+    ledger = rig["tool"].books.ledger
+    assert ledger.cycle == pytest.approx(10, abs=1)
+    assert ledger.cycle_duration_s == pytest.approx(0.1, abs=0.01)
+    assert ledger.cycle_damping_n_s_per_m == pytest.approx(rig["tool"].law_values()[1], rel=0.2)
 
 
 def test_tdpa_has_a_ring_use_up_first_what_the_port_has_taken_while_it_is_held() -> None:

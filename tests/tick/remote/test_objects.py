@@ -133,6 +133,31 @@ def test_turning_ends_where_the_client_says_by_the_shorter_way_and_within_its_sp
     assert 2.0 * math.atan2(port.turning.now[3], port.turning.now[0]) == pytest.approx(0.5 * math.pi, abs=1e-6)
 
 
+@pytest.mark.parametrize("hold_s", [0.05, 0.3])
+def test_it_goes_on_turning_for_as_long_as_the_scene_of_now_says(hold_s: float) -> None:
+    rig = Rig(BALL, axes="xyz")
+    rig.say("ball", orientation=[1.0, 0.0, 0.0, 0.0])
+    rig.go(ticks=3)
+    rig.switch(BALL + f"hold_s = {hold_s}\n")
+    rig.say("ball", orientation=[1.0, 0.0, 0.0, 0.0], angular_velocity_rad_per_s=[0.0, 0.0, 2.0])
+    rig.go(ticks=600)
+    assert 2.0 * math.asin(rig["ball"].turning.now[3]) == pytest.approx(2.0 * hold_s, rel=0.1)
+
+
+def test_an_object_stays_where_it_is_and_forgets_its_client_when_the_device_knows_its_place_again() -> None:
+    rig = Rig(BALL, axes="xyz")
+    for _ in range(20):
+        rig.say("ball", position_m=[0.0, 0.0, -0.045])
+        rig.go()
+    port = rig["ball"]
+    assert (port.state, port.seq) == (PortState.HELD, 20)
+    rig.tick.start(rig.sample)
+    assert (port.state, port.seq) == (PortState.IDLE, -1)
+    was_m = list(port.target_m)
+    rig.go(ticks=50)
+    assert port.target_m == was_m
+
+
 def test_a_client_that_is_silent_leaves_the_object_where_it_is() -> None:
     rig = Rig(PLANE, axes="xyz")
     for n in range(200):
@@ -176,6 +201,31 @@ def test_stiffness_goes_over_by_a_ramp_and_is_the_clients_work() -> None:
         was_n = now_n
     assert was_n == pytest.approx(0.5)
     assert rig.tick.totals().moved_j == pytest.approx(-0.5 * 1500.0 * 1e-6, rel=1e-6)
+    assert rig.unbalanced_j() < 1e-9
+
+
+def test_stiffness_that_changes_where_nothing_is_touched_is_no_work() -> None:
+    rig = Rig(BALL, axes="xyz")
+    for away_m, stiffness_n_per_m in ((-0.0199, 500.0), (-0.01, 1500.0), (0.1, 700.0)):
+        for _ in range(100):
+            rig.say("ball", stiffness_n_per_m=stiffness_n_per_m)
+            assert rig.go([0.0, 0.0, away_m]) == [0.0, 0.0, 0.0]
+        totals = rig.tick.totals()
+        assert (rig["ball"].work_j, totals.moved_j, totals.ledger.stored_j) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("away_m", [-0.0199, 0.1])
+def test_nothing_is_stored_in_what_is_left_while_its_stiffness_changes(away_m: float) -> None:
+    rig = Rig(BALL, axes="xyz")
+    rig.go([0.0, 0.0, -0.021], ticks=3)
+    rig.say("ball", stiffness_n_per_m=500.0)
+    rig.go(ticks=20)
+    work_j = rig["ball"].work_j
+    assert work_j < 0.0
+    for _ in range(3):
+        assert rig.go([0.0, 0.0, away_m]) == [0.0, 0.0, 0.0]
+        assert rig.tick.totals().ledger.stored_j == 0.0
+        assert rig["ball"].work_j == pytest.approx(work_j)
     assert rig.unbalanced_j() < 1e-9
 
 

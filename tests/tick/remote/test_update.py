@@ -80,3 +80,19 @@ def test_an_update_lies_as_numbers_of_eight_bytes_little_end_first() -> None:
 def test_each_thing_that_may_be_said_has_a_bit_of_its_own() -> None:
     bits = [POSITION, ORIENTATION, VELOCITY, TURNING, STIFFNESS, DAMPING, FORCE, RELEASED]
     assert bits == [1 << at for at in range(8)]
+
+
+def test_nothing_is_said_in_a_new_update_and_every_number_is_newer() -> None:
+    assert fields(Update()) == {
+        "said": 0,
+        "seq": -1,
+        "sent_ns": 0,
+        "received_ns": 0,
+        "position_m": [0.0] * 3,
+        "velocity_m_per_s": [0.0] * 3,
+        "angular_velocity_rad_per_s": [0.0] * 3,
+        "force_n": [0.0] * 3,
+        "orientation": [1.0, 0.0, 0.0, 0.0],
+        "stiffness_n_per_m": 0.0,
+        "damping_n_s_per_m": 0.0,
+    }
