@@ -163,8 +163,10 @@ def test_a_client_that_is_silent_leaves_the_object_where_it_is() -> None:
     for n in range(200):
         rig.say("floor", position_m=[0.0, 0.0, 1e-6 * n], velocity_m_per_s=[0.0, 0.0, 1e-3])
         rig.go()
-    rig.go(ticks=400)
     port = rig["floor"]
+    assert not port.rests
+    rig.go(ticks=400)
+    assert port.rests, "and costs no more than one that no client moves"
     assert port.state is PortState.STALE
     assert port.news is PortState.STALE
     assert port.target_m[2] == pytest.approx(1.99e-4 + 0.1 * 1e-3, abs=2e-6)
