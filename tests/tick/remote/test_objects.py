@@ -148,11 +148,12 @@ def test_an_object_stays_where_it_is_and_forgets_its_client_when_the_device_know
     rig = Rig(BALL, axes="xyz")
     for _ in range(20):
         rig.say("ball", position_m=[0.0, 0.0, -0.045])
-        rig.go()
+        rig.go([0.0, 0.0, -0.016])
     port = rig["ball"]
     assert (port.state, port.seq) == (PortState.HELD, 20)
+    assert port.force_n[2] > 0.5
     rig.tick.start(rig.sample)
-    assert (port.state, port.seq) == (PortState.IDLE, -1)
+    assert (port.state, port.seq, list(port.force_n)) == (PortState.IDLE, -1, [0.0, 0.0, 0.0])
     was_m = list(port.target_m)
     rig.go(ticks=50)
     assert port.target_m == was_m
