@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from hapticd.tick.remote.one_port import OnePort
+from hapticd.tick.remote.remote_object import RemoteObject
 from tests.recorded.hand import Hand
 from tests.recorded.journal import Journal
 from tests.tick.remote.rig import FORCE_PORT, WALL, Rig
@@ -98,9 +100,12 @@ def listen(talk: Talk) -> Journal:
 
 
 def _let_go_and_arm(rig: Rig, tick: int) -> None:
+    if tick == 830:
+        rig.tick.start(rig.sample)
+        rig.force = [0.0] * len(rig.force)
     if tick % 400 == 370:
         rig.tick.release()
-    if tick % 400 == 399:
+    if tick % 400 == 399 or tick == 850:
         rig.tick.arm()
 
 
@@ -137,6 +142,15 @@ def _note(journal: Journal, rig: Rig) -> None:
         journal.note(f"{name} target", tuple(port.target_m))
         journal.note(f"{name} state", [float(port.state), float(port.seq), port.age_s])
         journal.note(f"{name} books", [port.work_j, *port.law_values()])
+        if port.news is not None:
+            journal.say(f"{name}: {port.news!r}")
+            port.news = None
+        if isinstance(port, RemoteObject):
+            journal.note(f"{name} turned", [*port.turning.now, float(port.rests)])
+        if isinstance(port, OnePort):
+            books = port.books
+            cycle = (books.ledger.cycle, books.ledger.cycle_duration_s, books.ledger.cycle_damping_n_s_per_m)
+            journal.note(f"{name} cycle", [*cycle, books.ledger.energy_j, books.carried_j, float(port.asleep)])
     totals = rig.tick.totals()
     ledger = totals.ledger
     journal.note("books", [ledger.energy_j, ledger.stored_j, ledger.dissipated_j, ledger.generated_j, totals.moved_j])
