@@ -99,6 +99,13 @@ def test_the_word_counts_the_updates_and_a_tick_without_one_looks_at_nothing_els
     assert shared.words[REMOTE] == 4, "what was left half done is news"
 
 
+def test_a_loop_that_has_no_ports_yet_takes_nothing_and_waits_for_nothing(shared: SharedMemory) -> None:
+    reader = SlotReader(shared)
+    SlotWriter(shared, PORTS).write(0, at(0.1))
+    reader.take()
+    assert reader.seen == shared.words[REMOTE] == 1
+
+
 def test_of_several_updates_the_latest_is_taken(
     shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
 ) -> None:

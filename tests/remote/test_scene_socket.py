@@ -19,6 +19,7 @@ import zmq
 from hapticd.errors import InstanceError
 from hapticd.loop.memory import REMOTE, SharedMemory
 from hapticd.loop.remote_slots import SlotReader, SlotWriter
+from hapticd.remote import refusals
 from hapticd.remote.scene_socket import MOST_AT_ONCE, SCHEMA, SceneSocket
 from hapticd.tick.record import RecordLayout
 from tests.remote.heard import FIELD, TOOL, HeardPort
@@ -154,6 +155,26 @@ def test_a_refusal_that_follows_another_is_told_when_its_second_is_over(scene: S
         assert "stiffness_n_per_m" in client.answer()["text"]
         client.say(name="tool", seq=2, position_m=[math.nan])
         assert "position_m: must be a finite number" in client.answer()["text"]
+
+
+def test_who_has_the_name_by_now_does_not_hear_that_it_was_another_ones(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Talker(scene) as one, Talker(scene) as two:
+        one.say(name="tool", seq=1, position_m=[0.01])
+        scene.until(lambda: scene.ports[0].heard)
+        port = scene.socket.ports["tool"]
+        for seq in (1, 2):
+            two.say(name="tool", seq=seq, position_m=[0.5])
+        scene.until(lambda: port.refused == 2)
+        assert "belongs to" in two.answer()["text"]
+        one.say(name="tool", release=True)
+        scene.until(lambda: port.owner is None)
+        two.say(name="tool", seq=3, position_m=[0.02])
+        scene.until(lambda: scene.ports[0].heard[-1].position_m[0] == 0.02)
+        monkeypatch.setattr(refusals, "QUIET_NS", 0)
+        scene.turn()
+        assert not two.socket.poll(50), "its second refusal waited, and is not true any more"
 
 
 def test_a_client_that_comes_back_by_its_identity_has_its_name_back(scene: Scene) -> None:
