@@ -217,6 +217,18 @@ def test_stiffness_that_changes_where_nothing_is_touched_is_no_work() -> None:
         assert (rig["ball"].work_j, totals.moved_j, totals.ledger.stored_j) == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize(("said", "newton"), [(0.0, 0.0), (-5.0, 0.0), (0.25, 0.25e-3), (1e9, 2.0)])
+def test_stiffness_is_what_the_client_says_between_nothing_and_what_the_scene_allows(
+    said: float, newton: float
+) -> None:
+    rig = Rig(BALL, axes="xyz")
+    rig.go([0.0, 0.0, -0.021], ticks=3)
+    for _ in range(100):
+        rig.say("ball", stiffness_n_per_m=said)
+        rig.go()
+    assert rig.force == pytest.approx([0.0, 0.0, newton], abs=1e-9)
+
+
 @pytest.mark.parametrize("away_m", [-0.0199, 0.1])
 def test_nothing_is_stored_in_what_is_left_while_its_stiffness_changes(away_m: float) -> None:
     rig = Rig(BALL, axes="xyz")
@@ -253,6 +265,22 @@ def test_it_goes_on_under_its_name_and_place_through_a_reload_and_fades_out_with
     rig.go(ticks=100)
     assert rig.force == [0.0, 0.0, 0.0]
     assert rig.unbalanced_j() < 1e-9
+
+
+def test_a_file_that_puts_it_elsewhere_puts_it_there_and_one_that_does_not_leaves_it() -> None:
+    """Until its client says where it is to be."""
+    rig = Rig(BALL, axes="xyz")
+    for _ in range(100):
+        rig.say("ball", position_m=[0.0, 0.0, -0.045])
+        rig.go()
+    port = rig["ball"]
+    rig.switch(BALL.replace("2000.0", "1000.0"))
+    rig.go()
+    assert list(port.target_m) == pytest.approx([0.0, 0.0, -0.045], abs=1e-4)
+    rig.switch(BALL.replace("-0.05]", "-0.06]"))
+    rig.go(ticks=3)
+    assert list(port.target_m) == [0.0, 0.0, -0.06]
+    assert rig.go([0.0, 0.0, -0.031], ticks=60)[2] == pytest.approx(2.0)
 
 
 def test_what_a_client_moves_is_no_part_of_what_rests_beside_it() -> None:
