@@ -11,7 +11,7 @@ import pytest
 from hapticd.offline.operations import count_operations, operations_by_code
 from hapticd.tick.remote.follower import HASTE_PER_S
 from hapticd.tick.remote.port import PortState
-from tests.tick.remote.rig import COUPLING, MOST_N, PERIOD_S, RAMP_S, WALL, Rig, apart, length
+from tests.tick.remote.rig import COUPLING, MOST_N, PERIOD_S, RAMP_S, WALL, Rig, apart, length, update
 
 K, B, FASTEST = 2000.0, 5.0, 1.0
 RAMP_TICKS = round(RAMP_S / PERIOD_S)
@@ -315,6 +315,17 @@ def test_a_port_that_no_client_drives_costs_a_comparison_an_axis() -> None:
 
     without = cost(WALL)
     assert cost(WALL + COUPLING) - without <= 3 * 35
+
+
+def test_one_that_was_let_go_costs_no_more_than_one_that_no_client_has_driven() -> None:
+    rig = Rig(axes="xyz")
+    assert not any(channel.awake for channel in rig["tool"].channels)
+    held_at(rig, [1e-3, 0.0, 0.0], 20)
+    assert all(channel.awake for channel in rig["tool"].channels)
+    rig["tool"].take(update(rig.seq + 1, released=True))
+    rig.go(ticks=RAMP_TICKS + 5)
+    assert not any(channel.awake for channel in rig["tool"].channels)
+    assert rig["tool"].asleep
 
 
 def test_the_impulse_is_the_sum_of_the_forces_that_were_held() -> None:
