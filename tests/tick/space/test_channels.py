@@ -146,3 +146,22 @@ def test_a_start_beside_an_object_is_as_far_from_it_as_the_device_is() -> None:
     assert rig.tick.solids[0].solid.proxy.d == free_m
     rig.go((0.3, -0.2, 0.4), (0.3, -0.2, 0.4), at)  # and once more where it comes back from afar
     assert rig.tick.solids[0].solid.proxy.d == free_m
+
+
+def test_a_law_sees_a_surface_as_a_wall_below_nothing_by_the_depth_and_pushing_out() -> None:
+    shown: list[tuple[float, float, float, float]] = []
+
+    def step(_state: Any, _params: Any, tick: Any) -> float:
+        if tick.in_contact:
+            shown.append((tick.x_m, tick.moved_m, tick.velocity_m_per_s, tick.spring_n))
+        return float(tick.contact_n)
+
+    rig = Rig(ball(), "none").start(ABOVE)
+    for _ in rig.tick.switch(make_law=running(law(step))):
+        pass
+    rig.to((0.0, 0.0, 0.0301), 60).to((0.0, 0.0, 0.029), 11)
+    x_m, moved_m, speed_m_per_s, spring_n = shown[-1]
+    assert x_m == pytest.approx(-1e-3)
+    assert moved_m == pytest.approx(-1e-4)
+    assert speed_m_per_s < -0.05
+    assert spring_n == pytest.approx(5.0)
