@@ -43,10 +43,10 @@ class CommandHandler:
                     reply(True, receipt=self._receipt())
                 case "mark":
                     self._mark(request.get("text"), reply)
-                case "arm" | "disarm" | "calibrate" | "tare" | "clear" as do if state.recovery.lost:
-                    self._without_device(do, reply)
                 case "disarm":
-                    state.requests.disarm(_answering(reply))
+                    self.disarm(reply)
+                case "arm" | "calibrate" | "tare" | "clear" as do if state.recovery.lost:
+                    self._without_device(do, reply)
                 case "arm" | "calibrate" | "tare" | "clear" as do:
                     state.requests.submit({"do": do}, _answering(reply), _deadline_ns(request))
                 case "reload" if request.get("wait"):
@@ -59,6 +59,16 @@ class CommandHandler:
                     reply(True)
                 case other:
                     reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
+
+    def disarm(self, reply: Reply) -> None:
+        """Have the loop let go; without a device see that the next one is not armed by itself."""
+        state = self._state
+        if not state.recovery.lost:
+            state.requests.disarm(_answering(reply))
+            return
+        state.recovery.amend(replace(state.recovery.resume, may_arm=False))
+        state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
+        reply(True)
 
     def _receipt(self) -> dict[str, Any]:
         """What a recording of this daemon says of itself: status, the whole configuration, the computer."""
@@ -84,10 +94,6 @@ class CommandHandler:
         match do:
             case "arm" | "calibrate" | "tare":
                 reply(False, f"there is no device to {do}: {recovery.why}")
-            case "disarm":
-                recovery.amend(replace(recovery.resume, may_arm=False))
-                state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
-                reply(True)
             case _:
                 recovery.amend(replace(recovery.resume, latched=False))
                 state.tell(EventCode.CLEARED, "fault cleared")

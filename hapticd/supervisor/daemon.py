@@ -21,6 +21,7 @@ from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.reload import Reload
 from hapticd.supervisor.remote_process import RemoteProcess
 from hapticd.supervisor.request_queue import RequestQueue
+from hapticd.supervisor.sleep import SleepWatch
 from hapticd.supervisor.state import DaemonState
 from hapticd.supervisor.status import StatusBuilder
 from hapticd.supervisor.systemd import Notifier
@@ -55,6 +56,10 @@ def pause_s(flush_due_ns: int | None, now_ns: int) -> float:
 def _noted(record: TickRecord) -> tuple[object, ...]:
     """What of a tick has a status published when it changes."""
     return record.flags & ~Flag.LIMITED, *(wall.stiffness_n_per_m for wall in record.walls)
+
+
+def _unheard(_is_done: bool, _text: str = "", **_fields: object) -> None:
+    """For what was not asked for over a socket."""
 
 
 class Daemon:
@@ -124,6 +129,7 @@ class Daemon:
         self._problem = ""
         self._stopping = False
         self._ready = False
+        self._sleep = SleepWatch()
         self._stop_by_s = 0.0
 
     def run(self) -> int:
@@ -204,6 +210,9 @@ class Daemon:
             self._look_after_loop(now_s)
         # After it is known whether there is a device: what is asked for then holds for when it is back.
         self._handler.turn()
+        if slept_s := self._sleep.slept_s():
+            log.warning("the computer slept for %.1f s, and the device is disarmed: `hapticd arm`", slept_s)
+            self._handler.disarm(_unheard)
         if state.stop_reason:
             self.stop(state.stop_reason)
         self._reload.turn()
