@@ -129,7 +129,7 @@ class DeviceInfo:
             ("resolution_m", 0.0 <= self.resolution_m < math.inf, "must be 0 m or more"),
             ("workspace_m", found, "must be a lowest and a highest position for each axis"),
             ("nominal_rate_hz", 0.0 < self.nominal_rate_hz < math.inf, "must be more than 0 Hz"),
-            ("safe_damping_n_s_per_m", 0.0 < self.safe_damping_n_s_per_m < math.inf, "must be more than 0 N s/m"),
+            ("safe_damping_n_s_per_m", 0.0 <= self.safe_damping_n_s_per_m < math.inf, "must be 0 N s/m or more"),
             ("host_silence_ms", self.host_silence_ms is None or self.host_silence_ms >= 0.0, "must be 0 ms or more"),
         )
         return next((f"{key} = {getattr(self, key)}: {words}" for key, good, words in allowed if not good), "")

@@ -72,7 +72,7 @@ def test_a_device_that_cannot_be_opened_is_not_entered() -> None:
         ({"axes": ("x", "x")}, "axes"),
         ({"workspace_m": ()}, "workspace_m"),
         ({"workspace_m": ((0.1, -0.1),)}, "workspace_m"),
-        ({"safe_damping_n_s_per_m": 0.0}, "safe_damping_n_s_per_m"),
+        ({"safe_damping_n_s_per_m": -1.0}, "safe_damping_n_s_per_m"),
         ({"nominal_rate_hz": 0.0}, "nominal_rate_hz"),
         ({"resolution_m": math.nan}, "resolution_m"),
         ({"host_silence_ms": -1.0}, "host_silence_ms"),

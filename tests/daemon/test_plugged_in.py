@@ -56,6 +56,9 @@ class Absent:
     def poll(self) -> None:
         raise DeviceNotFoundError("not there")
 
+    def end(self) -> None:
+        """It has ended by itself."""
+
 
 def test_a_device_that_has_been_away_for_long_is_tried_when_something_is_plugged_in(
     bus: Path, monkeypatch: pytest.MonkeyPatch

@@ -129,9 +129,13 @@ def test_energy_cycle_holds_12_18_and_20_kn_per_m_in_every_start(stiffness: floa
     assert all(rest.held for rest in rests), [rest for rest in rests if not rest.held]
 
 
-def test_tdpa_holds_12_kn_per_m_only_when_it_is_bounded() -> None:
-    """Unbounded it is chaotic: the verdict is a share over starts, at the 3 N where the paper's failure shows."""
+@NIGHTLY
+def test_tdpa_that_is_bounded_holds_12_kn_per_m() -> None:
     assert all(rest.held for rest in run(everywhere("tdpa", 12000.0)))
+
+
+def test_tdpa_that_is_not_bounded_does_not_hold_12_kn_per_m() -> None:
+    """It is chaotic: the verdict is a share over starts, at the 3 N where the paper's failure shows."""
     drops_mm = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0]
     rests = run([Start("tdpa", 12000.0, 3.0, drop_mm, UNBOUNDED) for drop_mm in drops_mm])
     assert share([not rest.held for rest in rests]) > 0.5, rests

@@ -236,7 +236,7 @@ def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path) -> None
 
 def test_the_overview_of_studies_imports_none() -> None:
     script = (
-        "import sys\nfrom hapticd.cli import main\ntry:\n    main(['study'])\nexcept SystemExit:\n    pass\n"
+        "import sys\nfrom hapticd.cli import main\ntry:\n    main(['study', '--help'])\nexcept SystemExit:\n    pass\n"
         "heavy = {'numpy', 'numba', 'matplotlib'} & set(sys.modules)\nsys.exit(repr(heavy) if heavy else 0)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -111,9 +111,7 @@ def long(name: str, **keys: Any) -> Other:
 def picked(asked: Asked, rows: Any) -> Asked:
     """Some runs of many, in another order."""
     rows = np.asarray(rows).ravel()
-    columns = {
-        name: getattr(asked, name)[rows] for name in ("outcome", "peak_to_peak_m", "damping_n_s_per_m", "settled_s")
-    }
+    columns = {one.name: getattr(asked, one.name)[rows] for one in fields(asked) if one.name != "points"}
     return Asked([asked.points[row] for row in rows], **columns)
 
 
