@@ -25,6 +25,7 @@ from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
 from tests.daemon.test_deaths import PRESSED, Report, pressing
 
 LIMIT_N = 12.0
+LOWEST_LIMIT_N = 9.0
 RAMP_TICKS = 50
 RAMP_STEP_N = LIMIT_N / RAMP_TICKS
 
@@ -207,16 +208,17 @@ def explained_n(before: Choice, after: Choice, leaving: bool, tape: Tape, seq: i
     """Force that a switch just behind a tick may lead to, and how far off it may be [N].
 
     All walls that are pressed stand at x = 0. What is switched goes on from the force that was applied, which is let
-    out with the depth; what is touched in that very tick asks for what it asks for; what is not switched goes on,
-    perhaps in the middle of an earlier ramp. A wall that left with an earlier switch lets out with the depth as well,
-    with that from which it left.
+    out with the depth; what is touched in that very tick asks for what it asks for, within a limit that may be the
+    lower one or on its way; what is not switched goes on, perhaps in the middle of an earlier ramp. A wall that left
+    with an earlier switch lets out with the depth as well, with that from which it left.
     """
     now_m, next_m = -tape.position_m[seq], -tape.position_m[seq + 1]
     asked_n = clipped(tape.asked_n[seq + 1])
     if next_m <= 0.0:
         return 0.0, 0.0
     if now_m <= 0.0:
-        return asked_n, RAMP_STEP_N
+        held_n = clipped(asked_n, LOWEST_LIMIT_N)
+        return 0.5 * (held_n + asked_n), 0.5 * abs(asked_n - held_n) + RAMP_STEP_N
     let_out_n = LIMIT_N * max(0.0, 1.0 - next_m / now_m)
     if goes_on(before, after):
         return tape.force_n[seq], abs(asked_n - clipped(tape.asked_n[seq])) + let_out_n + 3.0 * RAMP_STEP_N
@@ -228,8 +230,8 @@ def goes_on(before: Choice, after: Choice) -> bool:
     return before.law == after.law and SCENES[before.scene][0] == SCENES[after.scene][0]
 
 
-def clipped(force_n: float) -> float:
-    return max(-LIMIT_N, min(LIMIT_N, force_n))
+def clipped(force_n: float, limit_n: float = LIMIT_N) -> float:
+    return max(-limit_n, min(limit_n, force_n))
 
 
 def switch_at_random(daemon: Daemon, count: int, record_property: Report) -> None:
