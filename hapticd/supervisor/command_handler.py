@@ -44,7 +44,7 @@ class CommandHandler:
                 case "mark":
                     self._mark(request.get("text"), reply)
                 case "disarm":
-                    self.disarm(reply)
+                    self.disarm(_answering(reply))
                 case "arm" | "calibrate" | "tare" | "clear" as do if state.recovery.lost:
                     self._without_device(do, reply)
                 case "arm" | "calibrate" | "tare" | "clear" as do:
@@ -60,15 +60,16 @@ class CommandHandler:
                 case other:
                     reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
 
-    def disarm(self, reply: Reply) -> None:
+    def disarm(self, answer: Answer | None = None) -> None:
         """Have the loop let go; without a device see that the next one is not armed by itself."""
         state = self._state
+        answer = answer or _unanswered
         if not state.recovery.lost:
-            state.requests.disarm(_answering(reply))
+            state.requests.disarm(answer)
             return
         state.recovery.amend(replace(state.recovery.resume, may_arm=False))
         state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
-        reply(True)
+        answer("")
 
     def _receipt(self) -> dict[str, Any]:
         """What a recording of this daemon says of itself: status, the whole configuration, the computer."""

@@ -58,10 +58,6 @@ def _noted(record: TickRecord) -> tuple[object, ...]:
     return record.flags & ~Flag.LIMITED, *(wall.stiffness_n_per_m for wall in record.walls)
 
 
-def _unheard(_is_done: bool, _text: str = "", **_fields: object) -> None:
-    """For what was not asked for over a socket."""
-
-
 class Daemon:
     """One running daemon.
 
@@ -212,7 +208,7 @@ class Daemon:
         self._handler.turn()
         if slept_s := self._sleep.slept_s():
             log.warning("the computer slept for %.1f s, and the device is disarmed: `hapticd arm`", slept_s)
-            self._handler.disarm(_unheard)
+            self._handler.disarm()
         if state.stop_reason:
             self.stop(state.stop_reason)
         self._reload.turn()

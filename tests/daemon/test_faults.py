@@ -69,7 +69,7 @@ def test_what_the_device_does_wrong_takes_the_force_out_by_a_ramp_until_cleared(
         record, summary = rig.recorded(code)
         if code == EventCode.SAMPLE_IMPOSSIBLE:
             most_n = summary.force_before_n + 1e-6
-            assert felt.peak_n <= most_n, "where nobody knows the position the last force is let out, no more"
+            assert felt.peak_n <= most_n, "without a position the last force is let out, no more"
         assert summary.ramp_ticks is not None
         assert summary.ramp_ticks <= RAMP
         assert summary.after_s >= 0.9

@@ -36,8 +36,8 @@ class Place:
         damping_n_s_per_m: of the same, and no law's.
         port: there is no surface: what it touches is a client's, on both sides of 0.
         spring: the law of the port knows a spring; else a force that says nothing of itself.
-        heard: so many ticks later the force of the port has been computed [ticks].
-        late: so many ticks later the device applies a force [ticks].
+        heard: how many ticks later the force of the port has been computed [ticks].
+        late: how many ticks later the device applies a force [ticks].
         shakes: the period varies by so much, as a share.
         stroke_m: a machine leads it to and fro by so much, whatever acts; 0: it is free [m].
         stroke_ticks: how long that takes one way [ticks].
@@ -70,7 +70,7 @@ class Course:
         ticks: for how long.
         begin: the place, as fields of `Place`.
         then: what changes at which tick.
-        again_every: after so many ticks all this happens once more; 0: never.
+        again_every: after how many ticks all this happens once more; 0: never.
         damping_n_s_per_m: what the law before had learned.
         debt_j: and what it owed.
     """

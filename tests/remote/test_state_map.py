@@ -1,4 +1,4 @@
-"""What a client is told of a tick is what the tick did: each key has its own number."""
+"""What a client hears of a tick is what the tick did: each key has its own number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A line of the picture: numbers in few digits, and what is told where room is short."""
+"""A line of the picture: numbers in few digits, and the longest form that has room."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class Bridge:
     def _local_s(self, timestamp: float) -> float:
         """When that was on LSL's clock, which is CLOCK_MONOTONIC.
 
-        The daemon's timestamps go ahead when the time of day was set or the computer slept, and what is told then may
+        The daemon's timestamps go ahead when the time of day was set or the computer slept, and what is sent then may
         come before the tick that shows it, or without any while the device is gone. What seems to lie ahead is of now.
         """
         now_s = time.monotonic()
