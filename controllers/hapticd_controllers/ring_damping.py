@@ -6,14 +6,15 @@ held force that amount is known beforehand: (k dt / 2) sum v^2 dt. So damping ha
     F = F_contact - (base + brake) v                       the paper's eq. 9, alpha = base + brake
     base  = leaks k dt / 2                                 leaks >= 1: what the sampled spring generates, and more where
                                                            swings do not die away (a delay, a slow actuator)
-    brake = 2 ratio sqrt(k m), at most m / (2 dt)          while the contact swings by itself
+    brake = 2 ratio sqrt(k m), with the base m / (2 dt)    while the contact swings by itself
           = (4 / pi) ratio k t                             t after the touch, until the first turn
 
-A *swing* runs from one turn of the position to the next. Its half period h tells the mass, m = k (h / pi)^2, and
-whether it is the contact's own or a hand's: no hand turns within 45 ms. Nothing about the device is given. Before the
-first turn the mass is unknown; a brake that grows with the time is the full one of any mass a quarter of a period after
-the touch, and takes from an arrival where that means to push, not to pull. One decision is made a swing, none between.
-docs/controllers.md has the reasons and the evidence.
+A *swing* runs from one turn of the position to the next. Its half period h tells the mass, m = k (h / pi)^2 + B dt,
+and whether it is the contact's own or a hand's: no hand turns within 45 ms. k is what the device was given of the wall,
+less where a limit holds force back; the damping B, part of a sample late, hides B dt of the mass. Nothing about the
+device is given. Before the first turn the mass is unknown; a brake that grows with the time is the full one of any mass
+a quarter of a period after the touch, and takes from an arrival where that means to push, not to pull. One decision is
+made a swing, none between. docs/controllers.md has the reasons and the evidence.
 """
 
 from __future__ import annotations
@@ -48,16 +49,18 @@ PATIENCE = 2.0  # full swings that do not shrink before the brake is halved inst
 FIRM = 3.0  # a ring with more such swings brings the first brake of the next one back, BACK times
 BACK = 8.0
 RELAX = 0.7  # of the first brake, after each ring that died away without more than that
-MOST_OF_MASS = 0.5  # brake in m/dt: a sampled damper is unstable by itself from 2, and 0.83 with one late sample
+MOST_OF_MASS = 0.5  # base and brake in m/dt: a sampled damper is unstable by itself from 2, and 0.83 one sample late
 BASE_OF_MASS = 0.45  # the same for the base, which also has to suit two late samples (0.54)
 GROWTH = 1.3  # of the base a swing: a step beyond the last one that was seen not to do, and within half too much
 EVIDENCE = 0.3  # that a swing of one turn threshold did not shrink; of counts, a fading ring repeats a few
+DOUBT = 0.5  # of that evidence which a swing that shrinks leaves: among a few counts one less is no proof
 ENOUGH = 1.2  # of it in a row before the base grows: two large swings, or four of two counts
 UNEVEN = 3.0  # in turn thresholds: swings as long as this are no noise, even or not
+DRIVEN = 0.3  # of the wall's force: where noise through the base is more, it drives the swings, and more base is worse
 ARRIVAL = 6.0  # swings of a contact before its base may grow: an arrival has died away by then
 SOFTENS = 0.5  # of the stiffness, from tick to tick: another wall, at which the device arrives now
 SLOWER = 0.9  # of the base, for each swing of a hand: this wall is being used and does not ring
-LEFT = 0.5  # of the base, for each time the device has left for good
+LEFT = 0.5  # of the base, for each time the device has left for good, or the wall has softened
 MOST_LEAKS = 1e3
 INHERITED = 4.0  # leaks taken over from the law before, at most: what holds every wall without delay
 
@@ -108,7 +111,8 @@ class State:
     swing_s: float  # time since its beginning
     last_s: float  # half period of the last swing; 0: none since the device came
     last_m: float  # its length
-    older_m: float  # that of the one before
+    older_s: float  # half period of the one before
+    older_m: float  # its length
     last_whole: bool
 
 
@@ -132,6 +136,7 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     _begin(state, min(0.0, snapshot.x_m), snapshot.velocity_m_per_s > 0.0, False)
     state.last_s = 0.0
     state.last_m = 0.0
+    state.older_s = 0.0
     state.older_m = 0.0
     state.last_whole = False
 
@@ -207,6 +212,9 @@ def _follow(state: Any, params: Any, tick: Any, turn_m: float, stiffness: float)
     elif -ahead_m > turn_m:
         since_s = state.swing_s - state.far_s
         half_s = state.far_s if state.whole else PART * state.far_s
+        deep_m = tick.moved_m - x_m  # a tick ago, as deep as it was given its force: less where a limit held that back
+        given = tick.applied_contact_n / deep_m if deep_m != 0.0 else 0.0
+        stiffness = max(0.0, min(stiffness, given))
         _end(state, params, half_s, abs(state.far_m - state.from_m), state.whole, turn_m, stiffness, tick.dt_s)
         _begin(state, state.far_m, not state.outward, True)
         state.swing_s = since_s
@@ -227,22 +235,16 @@ def _leave(state: Any, params: Any, tick: Any, turn_m: float) -> None:
 
 
 def _end(
-    state: Any,
-    params: Any,
-    half_s: float,
-    length_m: float,
-    whole: bool,
-    turn_m: float,
-    stiffness: float,
-    dt_s: float,
+    state: Any, params: Any, half_s: float, length_m: float, whole: bool, turn_m: float, stiffness: float, dt_s: float
 ) -> None:
     """A swing has ended: whose was it, does the contact need more base, does it need a brake?"""
     half_s *= sqrt(max(0.0, 1.0 - state.brake * state.brake))  # a braked swing takes longer than a free one
-    even = abs(half_s - state.last_s) <= max(EVEN_TICKS * dt_s, EVEN * half_s)
+    even = _even(state, half_s, turn_m, dt_s)
     shrinks = length_m < SHRINKS * state.older_m
     loud = length_m > LOUD * turn_m
     quick = half_s <= params.hand_half_period_s
-    mass_kg = _bounded(stiffness * (half_s / PI) * (half_s / PI))
+    mass_kg = stiffness * (half_s / PI) * (half_s / PI)
+    mass_kg = _bounded(mass_kg + state.damping_n_s_per_m * dt_s) if mass_kg > 0.0 else 0.0
     own = quick and (state.felt_mass_kg == 0.0 or mass_kg <= OWN * state.felt_mass_kg)
     own = own or (state.felt_mass_kg == 0.0 and not whole and state.swings >= MANY)  # it bounces, slowly
 
@@ -253,10 +255,12 @@ def _end(
         bounces = not whole and state.swings >= 2.0 and length_m > turn_m
         state.age += 1.0
         if shrinks:
-            state.steady = 0.0
+            state.steady *= DOUBT
         elif (alike or bounces) and state.age > ARRIVAL:
             state.steady += min(1.0, EVIDENCE * length_m / turn_m)
-            if state.steady > ENOUGH:
+            noise_n = state.base_n_s_per_m * state.noise_m / dt_s
+            deepest_n = stiffness * max(abs(state.from_m), abs(state.far_m))  # 0 at the surface, where nothing grows
+            if state.steady > ENOUGH and noise_n < DRIVEN * deepest_n:
                 state.leaks = min(MOST_LEAKS, GROWTH * state.leaks)
         if loud:
             if state.swings >= 2.0 and not shrinks:
@@ -270,14 +274,24 @@ def _end(
         state.brake = 0.0
         if state.felt_mass_kg == 0.0 and not whole:
             state.swings += 1.0
+    state.older_s = state.last_s
     state.older_m = state.last_m
     state.last_s = half_s
     state.last_m = length_m
     state.last_whole = whole
 
 
+def _even(state: Any, half_s: float, turn_m: float, dt_s: float) -> bool:
+    """Whether a swing is as long as the last one; of a few counts the way in and out differ."""
+    blur_s = max(EVEN_TICKS * dt_s, EVEN * half_s)
+    if abs(half_s - state.last_s) <= blur_s:
+        return True
+    again: bool = turn_m > TURN_NOISES * state.noise_m and abs(half_s - state.older_s) <= blur_s
+    return again
+
+
 def _feel(state: Any, mass_kg: float, own: bool, whole: bool) -> None:
-    """The mass, k (h / pi)^2; a swing that the surface has cut tells it roughly, which is for a beginning only."""
+    """The mass; a swing that the surface has cut tells it roughly, which is for a beginning only."""
     if state.felt_mass_kg == 0.0:
         state.felt_mass_kg = mass_kg
     elif whole and own:
@@ -298,8 +312,8 @@ def _brake(state: Any, params: Any) -> None:
     while used < state.stubborn and ratio > params.least_brake_ratio:
         ratio *= 0.5
         used += 1.0
-    if ratio <= params.least_brake_ratio:
-        state.stubborn = 0.0  # nothing helped: from the beginning
+    if ratio <= params.least_brake_ratio < params.brake_ratio:
+        state.stubborn = 0.0  # nothing helped: from the beginning, if there was more than the least
     state.brake = ratio
 
 
@@ -346,6 +360,7 @@ def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None
     leak = 0.5 * stiffness * dt_s
     if leak < SOFTENS * state.leak_n_s_per_m:
         state.age = 0.0
+        _relax(state, LEFT)
     base = leak * state.leaks
     if state.leaks > 1.0 and state.felt_mass_kg > 0.0:
         base = max(leak, min(base, BASE_OF_MASS * state.felt_mass_kg / dt_s))
@@ -353,7 +368,8 @@ def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None
     state.base_n_s_per_m = base
     damping = base
     if state.brake > 0.0:
-        damping = _bounded(base + _full(state, state.brake, stiffness, dt_s))
+        most = max(base, MOST_OF_MASS * state.felt_mass_kg / dt_s)
+        damping = _bounded(min(most, base + _full(state, state.brake, stiffness, dt_s)))
     elif state.arrives and state.swing_s <= params.hand_half_period_s:
         brake = QUARTER * state.first_brake * stiffness * state.swing_s
         if state.felt_mass_kg > 0.0:

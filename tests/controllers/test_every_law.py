@@ -147,7 +147,9 @@ def test_outside_a_wall_no_law_asks_for_a_force_but_the_bare_damper(law: ModuleT
         )
 
 
-@pytest.mark.parametrize("law", [tdpa, energy_cycle, energy_bounding, set_position], ids=lambda law: law.__name__)
+@pytest.mark.parametrize(
+    "law", [tdpa, energy_cycle, late_cycle, energy_bounding, set_position], ids=lambda law: law.__name__
+)
 def test_a_debt_beyond_all_bounds_stays_a_debt_and_a_credit_is_none(law: ModuleType) -> None:
     state, params = fresh_state(law), plain_object("Params", scalar_params(law.Params()))
     law.start(state, params, LawSnapshot(debt_j=1e300))

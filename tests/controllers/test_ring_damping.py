@@ -148,9 +148,10 @@ def test_a_stroke_of_the_hand_is_not_braked() -> None:
 
 
 def test_it_does_not_hold_on_to_a_device_that_leaves() -> None:
-    rig = rig_on(HARD)
+    dropped = replace(HARD, x_m=0.004)
+    rig = rig_on(dropped)
     lowest_n = min(force_n for x_m, force_n, _, _ in ticks(rig, 60))
-    pulls = rig_on(HARD, Params(pull_after=0))
+    pulls = rig_on(dropped, Params(pull_after=0))
     assert lowest_n == 0.0
     assert min(force_n for x_m, force_n, _, _ in ticks(pulls, 60)) < -0.1
 
@@ -181,7 +182,7 @@ def test_every_simulation_of_the_paper_converges(start: Device, active: str) -> 
 
 def test_one_sample_of_delay_grows_the_base() -> None:
     """Three leaks are due then; only the swings that do not die away tell it."""
-    late = Device(stiffness_n_per_m=15e3, resolution_m=2e-6, delay_samples=1, hand_n=-3.3)
+    late = Device(stiffness_n_per_m=15e3, resolution_m=2e-6, delay_samples=1, hand_n=-3.3, x_m=0.002)
     rig = rig_on(late)
     assert rig.run(6.0).held
     assert rig.state.base_n_s_per_m > 1.3 * leak(late)
@@ -258,6 +259,15 @@ def test_the_swing_tells_the_mass(mass_kg: float) -> None:
     assert rig.state.felt_mass_kg == pytest.approx(mass_kg, rel=0.15)
 
 
+@pytest.mark.parametrize("drop_m", [4.75e-3, 8.98e-3, 9.15e-3])
+def test_a_wall_whose_force_is_limited_makes_no_device_heavy(drop_m: float) -> None:
+    """12 N stop it later than 20 kN/m would have: a long swing, and no heavy device."""
+    pressed = Device(stiffness_n_per_m=20e3, hand_n=-6.0, x_m=drop_m)
+    rig = rig_on(pressed)
+    assert rig.run(4.0).held
+    assert rig.state.felt_mass_kg < 2.5 * pressed.mass_kg
+
+
 def test_damping_of_the_law_before_becomes_a_base_and_never_a_spike() -> None:
     rig = rig_on(SOFT, Params(brake_ratio=0.0, least_brake_ratio=0.0))
     ring_damping.start(rig.state, rig.params, LawSnapshot(damping_n_s_per_m=150.0))
@@ -266,6 +276,19 @@ def test_damping_of_the_law_before_becomes_a_base_and_never_a_spike() -> None:
     for _ in range(5):
         tap(rig)
     assert rig.state.base_n_s_per_m == pytest.approx(leak(SOFT), rel=1e-9)
+
+
+@pytest.mark.parametrize(("stiffness_n_per_m", "before_n_s_per_m"), [(4e3, 3.0), (1e3, 1.5), (1e3, 0.6)])
+def test_damping_of_the_law_before_that_is_within_four_leaks_goes_on_as_it_was(
+    stiffness_n_per_m: float, before_n_s_per_m: float
+) -> None:
+    state, params = fresh_state(ring_damping), plain_object("Params", scalar_params(Params()))
+    ring_damping.start(state, params, LawSnapshot(x_m=-1e-3, damping_n_s_per_m=before_n_s_per_m))
+    tick = LawTick(1e-6)
+    tick.dt_s, tick.in_contact, tick.x_m = 1e-3, True, -1e-3
+    tick.spring_n = tick.contact_n = 1e-3 * stiffness_n_per_m
+    ring_damping.step(state, params, tick)
+    assert state.damping_n_s_per_m == pytest.approx(before_n_s_per_m)
 
 
 def test_a_law_that_takes_over_in_mid_contact_does_not_take_the_depth_for_a_swing() -> None:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import pytest
 
-from hapticd.law import LawSnapshot, LawTick, fresh_state
+from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
 from hapticd_controllers import energy_cycle, none, tdpa
 from hapticd_controllers.tdpa import Params, step
 
@@ -208,3 +208,11 @@ def test_the_cap_is_the_most_that_is_injected_and_0_is_none(cap_n_s_per_m: float
     tdpa.start(state, params, LawSnapshot(debt_j=1.0))
     step(state, params, LawTick(x_m=-1e-3, velocity_m_per_s=0.1, in_contact=True, contact_n=10.0, spring_n=10.0))
     assert state.damping_n_s_per_m == pytest.approx(injected_n_s_per_m, rel=0.01)
+
+
+@pytest.mark.parametrize("carry_debt", [False, True])
+def test_a_law_that_takes_over_begins_without_credit(carry_debt: bool) -> None:
+    state, params = fresh_state(tdpa), plain_object("Params", scalar_params(Params(carry_debt=carry_debt)))
+    tdpa.start(state, params, LawSnapshot(x_m=-1e-3, debt_j=2e-3))
+    tdpa.step(state, params, LawTick(x_m=-1e-3, in_contact=True, contact_n=4.0, spring_n=4.0))
+    assert state.energy_j == (-2e-3 if carry_debt else 0.0)

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from hapticd.config.loading import parse
+from hapticd.offline.rehearsal import Rehearsal
 from tests.daemon.presses import AWAY, PRESS, scene_text
 from tests.daemon.running import Daemon, Subscriber
 from tests.offline.space_presses import KINDS, STARTS, STIFFNESSES, STILL_M
@@ -67,3 +69,28 @@ def test_from_sixty_starts_and_directions(
     least_um, most_um = min(spans) * 1e6, max(spans) * 1e6
     record_property("prints", f"{kind}, {stiffness:.0f} N/m, {law or 'default'}: {least_um:.1f} to {most_um:.1f} um")
     assert [span < STILL_M for span in spans] == [law is None] * STARTS, spans
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("stiffness", STIFFNESSES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_from_sixty_starts_and_directions_offline(
+    kind: str, stiffness: float, record_property: Callable[[str, object], None]
+) -> None:
+    """The same driver and tick without waiting for the clock."""
+    rehearsal = Rehearsal(parse(scene_text(stiffness, None, [kind], STARTS), "presses"))
+    seen: list[list[list[float]]] = [[] for _ in range(STARTS)]
+    pushed = [False] * STARTS
+    for ticks in rehearsal.run(STARTS * (PRESS + AWAY)):
+        press, tick = divmod(ticks, PRESS + AWAY)
+        if PRESS - JUDGED <= tick < PRESS:
+            seen[press].append(list(rehearsal.tick.motion.position_m))
+            pushed[press] = pushed[press] or any(rehearsal.tick.force_n)
+    assert rehearsal.fault is None
+    assert all(pushed)
+    spans = [_farthest_m(one) for one in seen]
+    record_property(
+        "prints", f"{kind}, {stiffness:.0f} N/m, offline: {1e6 * min(spans):.1f} to {1e6 * max(spans):.1f} um"
+    )
+    assert max(spans) < STILL_M, spans
