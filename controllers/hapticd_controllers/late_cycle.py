@@ -85,7 +85,8 @@ class State(CycleSums, FeltFields):
 def start(state: Any, params: Any, snapshot: Any) -> None:
     """Take over: damping that was reached and energy that was not dissipated count; a credit does not."""
     state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
-    state.eased_n_s_per_m = state.damping_n_s_per_m
+    # What pushes already is not let down; what does not may be out of reach and asked next in the midst of a touch.
+    state.eased_n_s_per_m = state.damping_n_s_per_m if snapshot.applied_n != 0.0 else 0.0
     _forget(state)
     state.cycle_s = 0.0
     state.velocity_m_per_s = 0.0

@@ -13,6 +13,9 @@ from hapticd.settings import Table
 MAX_PORTS = 16
 """Most couplings and forces together: the size of a tick record is fixed when the ring is made."""
 
+COME_IN_S = 0.3
+"""In which a coupling under the default law comes in unless it says otherwise [s]."""
+
 
 class CouplingConfig(Table):
     """[[scene.couplings]]: a spring and a damper between the device and a target that a client moves."""
@@ -31,6 +34,14 @@ class CouplingConfig(Table):
         0.1, gt=0.0, le=10.0, description="how long a target is good; an older one is let go by a ramp [s]"
     )
     max_speed_m_per_s: float = Field(1.0, gt=0.0, le=10.0, description="how fast a target that jumps is followed [m/s]")
+    come_in_s: float | None = Field(
+        None,
+        ge=0.0,
+        le=10.0,
+        description="in which spring and damper come to what they are whenever they come into force, from nothing: the "
+        f"first pull of a stiff spring throws off the body of a late client [s]; unset: {COME_IN_S} under the default "
+        "law of [remote], 0 under another; 0: by the ramp alone",
+    )
     driven: bool = Field(
         False,
         description="true: the law sees the device against the target and damps between the two, as for a target that "
@@ -71,6 +82,8 @@ class PortLimits:
         max_speed_m_per_s: how fast it is followed [m/s]; 0: a force goes nowhere.
         unchanged_s: how long a force may stay the same [s]; 0: as long as it is sent.
         driven: whether the law sees the device against the target, and not alone.
+        come_in_s: how long spring and damper take to come to what they are [s]; 0: no time of their own; None: what
+            its law asks for.
     """
 
     name: str
@@ -82,6 +95,7 @@ class PortLimits:
     max_speed_m_per_s: float
     unchanged_s: float = 0.0
     driven: bool = False
+    come_in_s: float | None = None
 
 
 def check_ports(objects: Iterable[str], couplings: Sequence[CouplingConfig], forces: Sequence[ForceConfig]) -> None:

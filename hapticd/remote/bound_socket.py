@@ -9,8 +9,10 @@ import zmq
 from hapticd.errors import InstanceError
 from hapticd.keys.connections import ConnectionBound, descriptor_of, local_peer
 from hapticd.keys.heartbeat import expect_signs_of_life
+from hapticd.keys.local_bind import bind_local
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
+from hapticd.paths import why_refused
 
 _LAST_WORDS_MS = 100
 
@@ -62,15 +64,15 @@ class BoundSocket:
         self.socket.setsockopt(zmq.MAXMSGSIZE, largest)
         endpoint = f"ipc://{path}"
         try:
-            self.socket.bind(endpoint)
-            path.chmod(0o660)
+            bind_local(self.socket, path)
             if tcp is not None:
                 endpoint, key = tcp
                 self._bind_tcp(endpoint, key, ring)
         except (zmq.ZMQError, OSError) as error:
             self.close()
-            advice = f"set another {key}" if tcp is not None and endpoint == tcp[0] else "run as its directory's user"
-            raise InstanceError(f"{endpoint}: {zmq.strerror(error.errno or 0)}; {advice}") from error
+            if tcp is not None and endpoint == tcp[0]:
+                raise InstanceError(f"{endpoint}: {zmq.strerror(error.errno or 0)}; set another {key}") from error
+            raise InstanceError(f"{endpoint}: {why_refused(error.errno)}") from error
         except InstanceError:
             self.close()
             raise

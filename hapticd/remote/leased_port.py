@@ -136,7 +136,6 @@ class LeasedPort:
         if self.owner is None:
             return False
         self.owner = None
-        self._under_way.clear()
         self.update.said |= RELEASED
         self.update.seq = min(self.update.seq + 1, LARGEST_NUMBER)
         self.update.received_ns = now_ns

@@ -203,9 +203,16 @@ def test_a_damping_is_at_most_the_felt_mass_over_a_period_and_less_where_forces_
 
 def test_damping_that_is_taken_over_is_in_force_at_once_and_after_silence_comes_anew() -> None:
     taken = Port()
-    late_cycle.start(taken.state, taken.params, LawSnapshot(damping_n_s_per_m=80.0))
+    late_cycle.start(taken.state, taken.params, LawSnapshot(applied_n=3.0, damping_n_s_per_m=80.0))
     assert taken.go(1e-4, 3.0) == pytest.approx(3.0 - 80.0 * 0.5 * 0.1)
     taken.leave()
+    assert taken.go(1e-4, 3.0) == pytest.approx(3.0 - 80.0 / 11.0 * 0.5 * 0.1)
+
+
+def test_damping_that_is_taken_over_out_of_reach_comes_in_with_the_first_touch() -> None:
+    """No step outside comes between: a port without a client is not asked."""
+    taken = Port()
+    late_cycle.start(taken.state, taken.params, LawSnapshot(damping_n_s_per_m=80.0))
     assert taken.go(1e-4, 3.0) == pytest.approx(3.0 - 80.0 / 11.0 * 0.5 * 0.1)
 
 

@@ -10,7 +10,7 @@ import pytest
 from hapticd.remote.leased_port import LeasedPort, NotTakenError, Sender
 from hapticd.remote.message import LARGEST_NUMBER, WrongMessageError
 from hapticd.tick.remote.update import POSITION, RELEASED, STIFFNESS
-from tests.remote.heard import TOOL
+from tests.remote.heard import TOOL, copied
 
 ONE = Sender(b"one", 7, 70, True, "user 1000, process 1")
 TWO = Sender(b"two", 8, 80, True, "user 1000, process 2")
@@ -76,6 +76,17 @@ def test_the_last_number_that_there_is_stays_when_the_name_is_let_go(port: Lease
     assert port.take({"release": True}, ONE, 1, MS)
     assert port.update.seq == LARGEST_NUMBER
     assert port.update.sent_ns == 0
+    assert copied(port.update).seq == LARGEST_NUMBER, "it fits into its slot"
+
+
+def test_what_was_in_force_when_the_name_is_let_go_is_counted_all_the_same(port: LeasedPort) -> None:
+    """The tick that was done with it is read a moment later."""
+    for seq, state_seq in ((1, 0), (2, 1)):
+        say(port, ONE, 0, seq, state_seq=state_seq)
+    port.take({"release": True}, ONE, 1, MS)
+    port.now_in_force(2, 2, 2 * MS, MS)
+    port.now_in_force(3, 3, 3 * MS, MS)
+    assert (sum(port.ages.counts), sum(port.round_trips.counts)) == (1, 1)
 
 
 @pytest.mark.parametrize("says", [False, 1, "yes", None])

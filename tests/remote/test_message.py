@@ -195,6 +195,8 @@ def test_a_force_beyond_the_limit_keeps_its_direction() -> None:
     assert taken(FIELD, axes=2, force_n=[30.0, -40.0]).force_n[:2] == pytest.approx([1.2, -1.6])
     assert taken(FIELD, force_n=[1e308]).force_n[0] == pytest.approx(2.0)
     assert taken(FIELD, force_n=[1]).force_n[0] == 1.0
+    largest = [1.7e308, 0.0, -1.7e308]
+    assert taken(FIELD, axes=3, force_n=largest).force_n == pytest.approx([2.0**0.5, 0.0, -(2.0**0.5)])
 
 
 def test_what_was_said_before_stays_but_for_the_velocity_of_another_place() -> None:

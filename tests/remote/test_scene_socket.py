@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import select
 import tempfile
 import time
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ import pytest
 import zmq
 
 from hapticd.errors import InstanceError
+from hapticd.keys.connections import has_ended
 from hapticd.loop.memory import REMOTE, SharedMemory
 from hapticd.loop.remote_slots import SlotReader, SlotWriter
 from hapticd.remote import refusals
@@ -114,6 +116,20 @@ def test_a_client_learns_what_there_is_and_drives_it(scene: Scene) -> None:
         owner = scene.socket.ports["tool"].owner
         assert owner is not None
         assert owner.name == f"user {os.getuid()}, process {os.getpid()}"
+        client.say(name="tool", seq=8, position_m=[0.03])
+        scene.until(lambda: len(scene.ports[0].heard) == 2)
+        assert scene.socket.ports["tool"].owner is owner, "who is known is not looked up again"
+
+
+def test_its_descriptor_is_readable_when_something_may_have_come(scene: Scene) -> None:
+    with Talker(scene) as client:
+        client.say(hello=True)
+        client.answer()
+        while scene.socket.receive():
+            pass
+        assert not select.select([scene.socket.descriptor], (), (), 0.0)[0]
+        client.say(hello=True)
+        assert select.select([scene.socket.descriptor], (), (), PATIENCE_S)[0]
 
 
 def test_of_two_clients_for_one_name_the_first_has_it_and_the_second_is_told_once_a_second(scene: Scene) -> None:
@@ -243,6 +259,25 @@ def test_a_flood_costs_a_turn_no_more_than_so_many_messages_and_the_latest_is_in
         scene.until(lambda: scene.ports[0].heard[-1].seq == count - 1)
 
 
+def test_a_turn_says_whether_more_may_wait(scene: Scene) -> None:
+    """Who asks goes on at once then, and hears that it was a flood."""
+    with Talker(scene) as client:
+        scene.until(lambda: client.socket.poll(0, zmq.POLLOUT))
+        for seq in range(60):
+            client.say(name="tool", seq=seq, position_m=[0.001])
+        assert select.select([scene.socket.descriptor], (), (), PATIENCE_S)[0]
+        turns = []
+        end_s = time.monotonic() + PATIENCE_S
+        while scene.socket.ports["tool"].messages + scene.socket.ports["tool"].late < 60:
+            assert time.monotonic() < end_s
+            before = scene.socket.ports["tool"].messages
+            more = scene.socket.receive()
+            turns.append((scene.socket.ports["tool"].messages - before, more))
+        assert all(more is True for count, more in turns if count == 50)
+        assert max(count for count, _ in turns) <= 50
+        assert scene.socket.receive() is False
+
+
 def test_after_a_reload_a_name_keeps_its_owner_and_another_list_is_not_mixed_up(scene: Scene) -> None:
     with Talker(scene) as one, Talker(scene) as two:
         one.say(name="field", seq=5, force_n=[1.0])
@@ -271,7 +306,11 @@ def test_each_port_has_the_owner_who_drives_it_until_it_is_gone(scene: Scene) ->
             two.say(name="tool", seq=1, position_m=[0.01])
             scene.until(lambda: scene.ports[0].heard)
             assert scene.socket.owners() == [me, me]
-        scene.until(lambda: scene.socket.owners() == ["", me])
+            gone = scene.socket.ports["tool"].owner
+            assert gone is not None
+        scene.until(lambda: has_ended(gone.descriptor, gone.inode))
+        assert scene.socket.owners() == ["", me], "at once, and not the next time"
+        assert scene.socket.ports["tool"].owner is None
     scene.until(lambda: scene.socket.owners() == ["", ""])
 
 

@@ -190,10 +190,11 @@ def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.Capture
 
 
 def test_one_client_again_says_what_it_is_and_what_becomes_of_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert remote("--replay", "force:1:0", "--laws", "none") == 0
+    assert remote("--replay", "force:1:0", "--laws", "none", "--come-in-s", "0.5") == 0
     said = capsys.readouterr().out
     case = draw(1, 0, "force")
     assert f"rate_hz = {case.network.rate_hz}" in said
+    assert "come_in_s = 0.5" in said
     assert "none" in said
     assert "damper:100" in said
 
@@ -208,7 +209,8 @@ def test_a_hand_that_moves_feels_a_damper_as_drag_and_comes_to_rest(hand: str) -
 
 
 @pytest.mark.parametrize(
-    "arguments", [("--clients", "0"), ("--hand", "slap"), ("--replay", "wall:1:2"), ("--laws", "no-such")]
+    "arguments",
+    [("--clients", "0"), ("--hand", "slap"), ("--replay", "wall:1:2"), ("--laws", "no-such"), ("--come-in-s", "11")],
 )
 def test_what_makes_no_sense_is_one_line(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     assert remote(*arguments) == 2

@@ -17,7 +17,16 @@ from hapticd_studies.remote.runs import COLUMNS, Case, draw, run
 from hapticd_studies.remote.sweep import RemotePlan
 from hapticd_studies.remote.windows import lost_table, windows_table
 
-LATE, NONE, DAMPER = parse_laws("late-cycle,none,damper:damping_n_s_per_m=50", {})
+
+def damper(n_s_per_m: int) -> LawSpec:
+    return LawSpec(f"damper:damping_n_s_per_m={n_s_per_m}", "damper", {"damping_n_s_per_m": n_s_per_m})
+
+
+# Not by parse_laws, which compiles each: every worker reads this file.
+NONE, TDPA, RING, CYCLE, LATE = (
+    LawSpec(name, name, {}) for name in ("none", "tdpa", "ring-damping", "energy-cycle", "late-cycle")
+)
+DAMPER = damper(50)
 PAUSED = replace(draw(4, 1, "tool"), network=Network(90.0, 0.02, 0.005, 0.3, 4.0, 1.0, 0.9))
 
 
@@ -29,12 +38,13 @@ PAUSED = replace(draw(4, 1, "tool"), network=Network(90.0, 0.02, 0.005, 0.3, 4.0
         (draw(4, 45, "tool"), LATE),  # thrown about, at its limits
         (draw(4, 3, "force", "stroke"), LATE),
         (draw(4, 2, "tool", "tap"), LATE),
+        (replace(PAUSED, come_in_s=0.0), LATE),
         *[
             pytest.param(draw(5, index, kind, hand), law, marks=pytest.mark.nightly)
             for index in range(10)
             for kind in ("tool", "force")
             for hand in ("press", "stroke", "tap")
-            for law in parse_laws("none,tdpa,ring-damping,energy-cycle,late-cycle,damper:damping_n_s_per_m=600", {})
+            for law in (NONE, TDPA, RING, CYCLE, LATE, damper(600))
         ],
     ],
 )
@@ -44,6 +54,14 @@ def test_a_compiled_run_is_the_run_of_the_daemons_own_tick_to_the_last_bit(case:
     ready = CompiledCase(case)
     assert ready.path(law)[0].tolist() == path_m
     assert ready.run(law) == ticked
+
+
+def test_a_coupling_that_comes_in_slowly_does_not_throw_off_the_body_that_a_prompt_one_does() -> None:
+    prompt, slow = (
+        CompiledCase(case).run(LATE) for case in (draw(7, 374, "tool", come_in_s=0.0), draw(7, 374, "tool"))
+    )
+    assert prompt[1] > 1e-3
+    assert slow[0] == Outcome.SETTLED
 
 
 def test_a_law_that_cannot_be_compiled_is_refused_by_name() -> None:
@@ -90,7 +108,7 @@ def test_a_window_counts_what_some_damper_holds_and_tells_what_the_law_does_not(
 @pytest.mark.nightly
 def test_of_two_couplings_as_stiff_and_as_late_one_needs_from_the_beginning_what_the_other_does_not_bear() -> None:
     """Of 6 kN/m and 20 ms: 60 N s/m within the first tenth of a second, and no more than 30."""
-    needs, bears = CompiledCase(draw(102, 263, "tool")), CompiledCase(draw(103, 25, "tool"))
+    needs, bears = (CompiledCase(draw(*each, "tool", come_in_s=0.0)) for each in ((102, 263), (103, 25)))
     values = (2, 5, 10, 20, 30, 60, 80, 120, 180, 270, 400)
 
     def held(case: CompiledCase, first: float, at_s: float) -> set[int]:

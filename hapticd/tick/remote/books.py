@@ -81,7 +81,6 @@ class PortBooks:
         self._weight = weight
 
     def let_go(self) -> None:
-        """Have nothing stored any more; what was is lost."""
+        """Have nothing stored any more; what was is lost. A port comes into force where the device is: slack."""
         self.ledger.dissipated_j += self.ledger.stored_j
         self.ledger.stored_j = 0.0
-        self._gain = self._weight = 0.0

@@ -32,7 +32,7 @@ class Coupling(OnePort):
         damping: of its damper, without the law's [N s/m].
     """
 
-    __slots__ = ("_speed_m_per_s", "_stretch_m", "damping", "follower")
+    __slots__ = ("_left_s", "_speed_m_per_s", "_stretch_m", "_unsaid_s", "damping", "follower")
 
     def __init__(self, limits: PortLimits, site: PortSite) -> None:
         super().__init__(limits, site)
@@ -40,6 +40,8 @@ class Coupling(OnePort):
         self.target_m = self.follower.at_m
         self.damping = Ramped(limits.damping_n_s_per_m)
         self._stretch_m = self._speed_m_per_s = 0.0
+        self._left_s = 0.0  # until spring and damper have come in
+        self._unsaid_s = site.come_in_s
 
     def change(self, limits: PortLimits) -> None:
         """Go on under other limits, and with what they say of the spring until the client says otherwise."""
@@ -71,8 +73,11 @@ class Coupling(OnePort):
     def _begin(self) -> None:
         motion = self.motion
         self.follower.begin(motion.position_m, motion.velocity_m_per_s)
-        self.stiffness.arrive()
-        self.damping.arrive()
+        self._left_s = come_in_s = self._come_in_s()
+        # Not from nothing: without a spring a law would not see that one begins.
+        share = self._period_s / come_in_s if self._period_s < come_in_s else 1.0
+        self.stiffness.begin(share)
+        self.damping.begin(share)
 
     def _see(self, dt_s: float) -> None:
         follower = self.follower
@@ -115,6 +120,14 @@ class Coupling(OnePort):
 
     def _go_on(self, passed_s: float) -> None:
         super()._go_on(passed_s)
-        step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
+        ramp_s = self.ramp_s
+        if self._left_s > 0.0:
+            self._left_s -= passed_s
+            ramp_s = max(ramp_s, self._come_in_s())
+        step = passed_s / ramp_s if passed_s < ramp_s else 1.0
         self.stiffness.go_on(step)
         self.damping.go_on(step)
+
+    def _come_in_s(self) -> float:
+        said = self.limits.come_in_s
+        return self._unsaid_s if said is None else said

@@ -77,7 +77,7 @@ class OnePort(Port):
         axes = len(site.motion.position_m)
         super().__init__(limits, axes)
         self.books = PortBooks()
-        self.channels = [PortAxis(self, axis, site.make_law, site.resolution_m) for axis in range(axes)]
+        self.channels = [PortAxis(self.books, axis, site.make_law, site.resolution_m) for axis in range(axes)]
         self.ramp_s = site.ramp_s
         self.most_n = self.limit_n = limits.max_force_n
         self.stiffness = Ramped(limits.stiffness_n_per_m)
@@ -88,6 +88,15 @@ class OnePort(Port):
         self._due = False
         self._outside_s = self._most_change_n = 0.0
         self._from_m = [0.0] * axes  # where the device was
+
+    def join(self) -> None:
+        """Be in a scene. Only there it and its axes know each other: in the loop no collector looks for circles."""
+        for channel in self.channels:
+            channel.port = self
+
+    def part(self) -> None:
+        """Be in none any more; it must be asleep."""
+        self.channels = []
 
     def take(self, update: Update) -> None:
         """Take what the client has said; called between ticks."""
@@ -238,7 +247,8 @@ class OnePort(Port):
         self.pass_time(passed_s)
         step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
         if self.state is _HELD:
-            self.weight = min(1.0, self.weight + step)
+            if self.channels[0].in_contact:  # a ramp begins with the first sample that there is a force for
+                self.weight = min(1.0, self.weight + step)
         elif self.weight > 0.0:
             self.weight = self.weight - step if self.weight > step else 0.0
         goal_n = self.limits.max_force_n
@@ -286,33 +296,35 @@ class PortAxis(Channel):
     """One axis of a port. The first one leads: its calls go to the port, and those of the others do nothing.
 
     Args:
-        port: it.
+        books: of all axes.
         axis: of the device.
         make_law: a fresh law for it.
         resolution_m: smallest step of the device's position [m].
 
     Attributes:
         make_law: the same.
+        port: whose axis it is, from when that is in a scene.
         asked_n: what its law asks for, blended, before the port's own ramp and limit [N].
         own_n: the part of what is applied that is not the law's [N].
     """
 
-    __slots__ = ("_leads", "_port", "asked_n", "make_law", "own_n")
+    __slots__ = ("_leads", "asked_n", "make_law", "own_n", "port")
 
-    def __init__(self, port: OnePort, axis: int, make_law: Callable[[], RunningLaw], resolution_m: float) -> None:
-        super().__init__(make_law(), resolution_m, port.books.ledger)
+    port: OnePort
+
+    def __init__(self, books: PortBooks, axis: int, make_law: Callable[[], RunningLaw], resolution_m: float) -> None:
+        super().__init__(make_law(), resolution_m, books.ledger)
         self.make_law = make_law
         self.wall = Line(axis)  # type: ignore[assignment]  # stands for a wall, see there
         self.awake = False
         self.asked_n = self.own_n = 0.0
-        self._port = port
         self._leads = axis == 0
 
     def start(self, position_m: float) -> None:
         """Be at a position, at rest and without force; what a client has said before does not count."""
         del position_m
         if self._leads:
-            self._port.stand()
+            self.port.stand()
 
     def wake(self, awake: bool) -> None:
         """Take part in the ticks, or not."""
@@ -323,7 +335,7 @@ class PortAxis(Channel):
         """See a new sample; the port looks for itself where the device is."""
         del x_m, velocity_m_per_s
         if self._leads:
-            self._port.observe(dt_s)
+            self.port.observe(dt_s)
 
     def act(self, periods: float) -> None:
         """Ask the laws for their forces.
@@ -332,24 +344,23 @@ class PortAxis(Channel):
             BaseException: whatever a law raises.
         """
         if self._leads:
-            self._port.act(periods)
+            self.port.act(periods)
 
     def hold(self, periods: float) -> None:
         """Stay with what the laws asked for last; ramps go on."""
         if self._leads:
-            self._port.hold(periods)
+            self.port.hold(periods)
 
     def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
         """Enter the tick into the books and remember what is applied from now on."""
         if self._leads:
-            self._port.settle(share, gain, limit_n, dt_s)
+            self.port.settle(share, gain, limit_n, dt_s)
 
     def blend(self, ticks: int, gain: float, limit_n: float) -> None:
         """Start the next force where the applied one is now, and go over to what the law asks for."""
-        self.blending = False
         if self.in_contact:
-            gain *= self._port.weight
-            limit_n = min(limit_n, self._port.most_n)
+            gain *= self.port.weight
+            limit_n = min(limit_n, self.port.most_n)
             from_n = self.applied_n / gain if gain > 0.0 else 0.0
             start_blend(self, min(max(from_n, -limit_n), limit_n), -1.0, limit_n, ticks)
 
@@ -373,6 +384,15 @@ class PortAxis(Channel):
         self.force_n = self.requested_n
         Contact.hold(self, periods)
         self.asked_n = self.force_n
+
+    def push(self, contact_n: float) -> None:
+        """Have the port's own force be another one from this tick on; what its law asked for goes along.
+
+        Args:
+            contact_n: the force [N].
+        """
+        self.requested_n += contact_n - self._contact_n
+        self.tick.contact_n = self._contact_n = contact_n
 
     def apply_scaled(self, share: float, scale: float) -> None:
         """Remember what is applied from now on.

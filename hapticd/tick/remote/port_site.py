@@ -21,6 +21,7 @@ class PortSite:
         resolution_m: smallest step of the device's position [m].
         period_s: nominal time between ticks [s].
         ramp_s: duration of ramps [s].
+        come_in_s: how long a coupling takes to come in that does not say it [s].
     """
 
     motion: Motion
@@ -28,3 +29,4 @@ class PortSite:
     resolution_m: float
     period_s: float
     ramp_s: float
+    come_in_s: float

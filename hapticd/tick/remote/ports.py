@@ -33,7 +33,9 @@ class PortArrangement:
         self.turned: list[OnePort] = []
 
     def take(self) -> None:
-        """Have those that go on do so under their new limits, and those that are gone fade out."""
+        """Have those that are new join, those that go on do so under their new limits, those that are gone fade out."""
+        for port in self.new:
+            port.join()
         for port, limits in self.changed:
             port.change(limits)
         for port in self.gone:

@@ -42,9 +42,14 @@ class Ramped:
         self.goal = goal
         self._share = 0.0
 
-    def arrive(self) -> None:
-        """Be where it goes."""
-        self._share = 1.0
+    def begin(self, share: float) -> None:
+        """Come to where it goes from nothing.
+
+        Args:
+            share: how much of the way is behind it, 0 to 1; 1: be there.
+        """
+        self._from = 0.0
+        self._share = share
 
     def go_on(self, step: float) -> None:
         """Take a step of the ramp, a share of the whole."""

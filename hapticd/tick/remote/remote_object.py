@@ -27,35 +27,37 @@ class RemoteObject(Port):
 
     Args:
         limits: what it may do.
-        contact: the object's contact.
+        solid: the object, as compiled.
 
     Attributes:
+        contact: the object's contact, from when that is in a scene.
         follower: of its origin.
         turning: of its orientation.
     """
 
-    __slots__ = ("_contact", "_damping", "_stiffness", "follower", "turning")
+    __slots__ = ("_damping", "_stiffness", "contact", "follower", "turning")
 
-    def __init__(self, limits: PortLimits, contact: RemoteContact) -> None:
+    contact: RemoteContact
+
+    def __init__(self, limits: PortLimits, solid: Solid) -> None:
         super().__init__(limits, 3)
-        first = contact.solid.configs[0]
-        self._contact = contact
+        first = solid.configs[0]
         self.follower = Follower(3, limits.max_speed_m_per_s, limits.hold_s)
-        self.turning = Turning(first.orientation, self._max_turning(limits), limits.hold_s)
+        self.turning = Turning(first.orientation, _max_turning(limits, solid), limits.hold_s)
         self.target_m = self.follower.at_m
-        self._stiffness = contact.solid.stiffness_n_per_m
-        self._damping = contact.solid.damping_n_s_per_m
+        self._stiffness = solid.stiffness_n_per_m
+        self._damping = solid.damping_n_s_per_m
         self.stop(first.position_m)
 
     @property
     def object_index(self) -> int:
         """Which object of the scene it is."""
-        return self._contact.solid.index
+        return self.contact.solid.index
 
     @property
     def work_j(self) -> float:
         """What the client's motion and changes have put in, less what they took [J]."""
-        return self._contact.moved_j
+        return self.contact.moved_j
 
     @property
     def rests(self) -> bool:
@@ -64,17 +66,17 @@ class RemoteObject(Port):
 
     def law_values(self) -> tuple[float, float, float]:
         """Stiffness in force [N/m], damping of the law [N s/m] and the mass that it has felt [kg], for a record."""
-        normal = self._contact.normal
-        return self._contact.solid.stiffness_n_per_m, normal.damping_n_s_per_m, normal.felt_mass_kg
+        normal = self.contact.normal
+        return self.contact.solid.stiffness_n_per_m, normal.damping_n_s_per_m, normal.felt_mass_kg
 
     def change(self, limits: PortLimits) -> None:
         """Go on under other limits, and with what they say of the surface until the client says otherwise."""
         self.limits = limits
         self.follower.max_speed_m_per_s = limits.max_speed_m_per_s
-        self.turning.follower.max_speed_m_per_s = self._max_turning(limits)
+        self.turning.follower.max_speed_m_per_s = _max_turning(limits, self.contact.solid)
         self.follower.hold_s = self.turning.follower.hold_s = limits.hold_s
-        self._stiffness = self._contact.solid.stiffness_n_per_m
-        self._damping = self._contact.solid.damping_n_s_per_m
+        self._stiffness = self.contact.solid.stiffness_n_per_m
+        self._damping = self.contact.solid.damping_n_s_per_m
 
     def stop(self, position_m: Vector | None = None) -> None:
         """Stay where it is, or at a place."""
@@ -91,7 +93,7 @@ class RemoteObject(Port):
 
     def towards(self, step: float) -> tuple[float, float]:
         """Stiffness and damping of its surface after a step of their ramps, a share of the whole."""
-        solid = self._contact.solid
+        solid = self.contact.solid
         first = solid.configs[0]
         most = (first.stiffness_n_per_m * step, abs(first.damping_n_s_per_m) * step)
         return (
@@ -101,7 +103,7 @@ class RemoteObject(Port):
 
     def _hear(self, update: Update) -> bool:
         said = update.said
-        first = self._contact.solid.configs[0]
+        first = self.contact.solid.configs[0]
         self._stiffness = first.stiffness_n_per_m
         self._damping = first.damping_n_s_per_m
         if said & STIFFNESS:
@@ -117,10 +119,6 @@ class RemoteObject(Port):
                 update.angular_velocity_rad_per_s if said & TURNING else None,
             )
         return bool(said & (POSITION | VELOCITY | ORIENTATION | TURNING | STIFFNESS | DAMPING))
-
-    def _max_turning(self, limits: PortLimits) -> float:
-        outer_m = self._contact.solid.placed[0].outer_m()
-        return limits.max_speed_m_per_s / (outer_m if outer_m < inf else ENDLESS_M)
 
 
 class RemoteContact(SolidContact):
@@ -155,7 +153,11 @@ class RemoteContact(SolidContact):
         self.carried_j = 0.0
         self.ramp_s = ramp_s
         self._before_n_per_m = solid.stiffness_n_per_m
-        self.port = RemoteObject(limits, self)
+        self.port = RemoteObject(limits, solid)
+
+    def join(self) -> None:
+        """Be in a scene. Only there it and its port know each other: in the loop no collector looks for circles."""
+        self.port.contact = self
 
     def reach(self) -> Proxy:
         """Everywhere: it may come to a device that rests."""
@@ -236,6 +238,11 @@ class RemoteContact(SolidContact):
             self.moved_j += stored_j - self.ledger.stored_j
             self.ledger.stored_j = stored_j
         self.port.force_n[:] = self.force
+
+
+def _max_turning(limits: PortLimits, solid: Solid) -> float:
+    outer_m = solid.placed[0].outer_m()
+    return limits.max_speed_m_per_s / (outer_m if outer_m < inf else ENDLESS_M)
 
 
 def _towards(now: float, goal: float, most: float) -> float:

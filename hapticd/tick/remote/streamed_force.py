@@ -77,14 +77,22 @@ class StreamedForce(OnePort):
 
     def _see(self, dt_s: float) -> None:
         motion = self.motion
-        step_n = self.limits.max_force_n * dt_s / BLEND_S
+        for axis, channel in enumerate(self.channels):
+            moved_m = motion.position_m[axis] - self._from_m[axis]
+            channel.see(1.0, -LEAST_M, moved_m, motion.velocity_m_per_s[axis], dt_s, 0.0, self._now_n[axis])
+
+    def _go_on(self, passed_s: float) -> None:
+        """The force goes on at every tick: a device may have samples that are further apart than `BLEND_S`."""
+        super()._go_on(passed_s)
+        if not self.channels[0].in_contact:
+            return
+        step_n = self.limits.max_force_n * passed_s / BLEND_S
         way_n = [goal - now for goal, now in zip(self._goal_n, self._now_n, strict=True)]
         length_n = sqrt(sum([newton * newton for newton in way_n]))
         share = step_n / length_n if length_n > step_n else 1.0
         for axis, channel in enumerate(self.channels):
             self._now_n[axis] += share * way_n[axis]
-            moved_m = motion.position_m[axis] - self._from_m[axis]
-            channel.see(1.0, -LEAST_M, moved_m, motion.velocity_m_per_s[axis], dt_s, 0.0, self._now_n[axis])
+            channel.push(self._now_n[axis])
 
     def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
         """The client's own part of the force is its work, and the law's is lost."""

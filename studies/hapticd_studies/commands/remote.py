@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from hapticd.config.remote import COME_IN_S
 from hapticd.errors import ConfigError
 from hapticd_studies.grid.output import require_cluster, require_extra, require_folder, write
 
@@ -20,6 +21,7 @@ def command(
     clients: Annotated[int, typer.Option(help="How many random clients of each kind.")] = 500,
     seed: Annotated[int, typer.Option(help="Of the clients; the same seed gives the same ones anywhere.")] = 1,
     hand: Annotated[str, typer.Option(help="What the hand does to random clients: press, stroke or tap.")] = "press",
+    come_in_s: Annotated[float, typer.Option(help="`come_in_s` of the couplings, 0 to 10.")] = COME_IN_S,
     laws: Annotated[str, typer.Option(help="Laws to compare, as none,energy-cycle:window=1.")] = "",
     quick: Annotated[
         bool, typer.Option("--quick", help="A few clients and no ladder: about 20 s on one core.")
@@ -48,6 +50,8 @@ def command(
         raise ConfigError(f"--clients {clients}: must be from 1 to {_MOST_CLIENTS}")
     if not 0 <= seed < 10**18:
         raise ConfigError(f"--seed {seed}: must be 0 or more and less than 1e18")
+    if not 0.0 <= come_in_s <= 10.0:
+        raise ConfigError(f"--come-in-s {come_in_s}: must be from 0 to 10")
 
     from hapticd_studies.law_spec import parse_laws
     from hapticd_studies.remote.runs import HANDS
@@ -60,7 +64,7 @@ def command(
     if replay is not None:
         from hapticd_studies.remote.replay import case_of, figures
 
-        case = case_of(replay, hand)
+        case = case_of(replay, hand, come_in_s)
         for line in case.words():
             console.print(line, markup=False)
         console.print(figures(case, [*chosen, *dampers]))
@@ -75,7 +79,7 @@ def command(
     each = ["none", *(f"damper:damping_n_s_per_m={value}" for value in WINDOW)]
     window = [] if quick else parse_laws(",".join(each), {})
     count = min(clients, _QUICK_CLIENTS) if quick else clients
-    plan = RemotePlan(seed, count, chosen, dampers, window, not quick and hand == "press", hand)
+    plan = RemotePlan(seed, count, chosen, dampers, window, not quick and hand == "press", hand, come_in_s)
     Console(stderr=True, highlight=False).print(f"{plan.runs} runs", soft_wrap=True)
     job = plan.job()
     with kept(job, output / "remote.journal", fresh) as journal:

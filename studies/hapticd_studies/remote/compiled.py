@@ -64,6 +64,7 @@ class CompiledCase:
             "most_m_per_s": limits.max_speed_m_per_s,
             "hold_s": limits.hold_s,
             "ramp_s": loaded.config.safety.ramp_s,
+            "come_in_s": case.come_in_s,
             "period_s": period_s,
             "first_s": -1.0 / case.network.rate_hz,
             "tool_kg": case.tool_kg,

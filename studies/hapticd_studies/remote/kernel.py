@@ -31,6 +31,7 @@ PORT = {
     "most_m_per_s": float,
     "hold_s": float,
     "ramp_s": float,
+    "come_in_s": float,
     "period_s": float,
     "first_s": float,
     "tool_kg": float,
@@ -112,10 +113,12 @@ def run(
     lost = (1.0 - decay) * (1.0 - decay)
     gain_m_per_s = HASTE_PER_S * port.most_m_per_s * period_s
     ramp = period_s / port.ramp_s if period_s < port.ramp_s else 1.0
+    come = period_s / port.come_in_s if period_s < port.come_in_s else 1.0
     ramp_n = port.most_n * period_s / BLEND_S
     force_n = own_n = damping = 0.0
     asleep, held, in_contact = True, False, False
-    weight = age_s = outside_s = impulse_n_s = 0.0
+    weight = age_s = outside_s = impulse_n_s = left_s = 0.0
+    come_share = 1.0
     at_m = speed_m_per_s = goal_m = goal_m_per_s = ahead_s = 0.0
     goal_n = now_n = 0.0
     body_m = body_m_per_s = before_n_s = mean_n = 0.0
@@ -154,6 +157,7 @@ def run(
                 if begins:
                     way_m = 0.0
                     now_n = 0.0
+                    come_share, left_s = come, port.come_in_s
                     at_m = x_m
                     share = 1.0
                     if abs(velocity_m_per_s) > port.most_m_per_s:
@@ -178,11 +182,11 @@ def run(
                     stretch_m = x_m - at_m
                     speed = velocity_m_per_s - speed_m_per_s
                     length_m, pace = abs(stretch_m), abs(speed)
-                    k, b = port.stiffness_n_per_m, 0.0
+                    k, b = come_share * port.stiffness_n_per_m, 0.0
                     if length_m > LEAST_M:
-                        k = min(k * length_m, port.most_n) / length_m
+                        k = come_share * min(port.stiffness_n_per_m * length_m, port.most_n) / length_m
                     if pace > 0.0:
-                        b = min(port.damping_n_s_per_m * pace, port.most_n) / pace
+                        b = come_share * min(port.damping_n_s_per_m * pace, port.most_n) / pace
                     if -LEAST_M < stretch_m < LEAST_M:
                         stretch_m = -LEAST_M
                     tick.x_m = stretch_m
@@ -205,6 +209,8 @@ def run(
                 weight = min(1.0, weight + ramp)
             elif weight > 0.0:
                 weight = weight - ramp if weight > ramp else 0.0
+            come_share = min(1.0, come_share + (min(come, ramp) if left_s > 0.0 else ramp))
+            left_s -= period_s
 
             # law, limit
             asked_n = law_step(law_state, law_params, tick)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from rich.markup import escape
 from rich.table import Table
 
+from hapticd.config.remote import COME_IN_S
 from hapticd.errors import ConfigError
 from hapticd.offline.outcome import Outcome
 from hapticd_studies.law_spec import LawSpec
@@ -15,8 +16,8 @@ from hapticd_studies.remote.runs import COLUMNS, Case, draw, run
 from hapticd_studies.remote.sweep import KINDS
 
 
-def case_of(text: str, hand: str = "press") -> Case:
-    """The client of `KIND:SEED:INDEX`, under a hand.
+def case_of(text: str, hand: str = "press", come_in_s: float = COME_IN_S) -> Case:
+    """The client of `KIND:SEED:INDEX`, under a hand, with a coupling that comes in within a time.
 
     Raises:
         ConfigError: it is none.
@@ -24,7 +25,7 @@ def case_of(text: str, hand: str = "press") -> Case:
     found = re.fullmatch(rf"({'|'.join(KINDS)}):(\d{{1,18}}):(\d{{1,9}})", text)
     if found is None:
         raise ConfigError(f"--replay {text}: must be KIND:SEED:INDEX, as tool:1:57")
-    return draw(int(found[2]), int(found[3]), found[1], hand)
+    return draw(int(found[2]), int(found[3]), found[1], hand, come_in_s)
 
 
 def figures(case: Case, laws: Sequence[LawSpec]) -> Table:

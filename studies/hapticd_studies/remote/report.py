@@ -127,6 +127,7 @@ class RemoteReport:
                 "seed": self.plan.seed,
                 "clients_of_each_kind": self.plan.count,
                 "hand": self.plan.hand,
+                "come_in_s": self.plan.come_in_s,
                 "criterion": Criterion().declared(),
                 "ladder": [asdict(one) for one in self.reaches],
                 "random": [asdict(one) for one in self.shares],

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from hapticd.config.loading import LoadedConfig, parse
+from hapticd.config.remote import COME_IN_S
 from hapticd.offline.felt import WINDOW_S, felt_index
 from hapticd.offline.outcome import Balance, Criterion, Outcome
 from hapticd.offline.rehearsal import Rehearsal
@@ -76,6 +77,7 @@ class Case:
         table_n_per_m: stiffness of what that lies on [N/m].
         hand_kg, hand_n_s_per_m, hand_n_per_m: what of the hand moves with the device.
         seed: of everything random.
+        come_in_s: in which the coupling comes to its stiffness [s].
         hand: `press`: it presses and stays; `stroke`, `tap`: first it goes to and fro for 4 s, past the surface.
     """
 
@@ -91,6 +93,7 @@ class Case:
     hand_n_per_m: float = 100.0
     seed: int = 1
     hand: str = "press"
+    come_in_s: float = COME_IN_S
 
     @property
     def duration_s(self) -> float:
@@ -106,6 +109,7 @@ class Case:
     def config(self, law: LawSpec) -> LoadedConfig:
         """The daemon's configuration for it."""
         coupling = f"stiffness_n_per_m = {self.stiffness_n_per_m!r}\ndamping_n_s_per_m = 2.0\nhold_s = 0.25"
+        coupling += f"\ncome_in_s = {self.come_in_s!r}"
         loaded = _parsed(
             _CONFIG.format(
                 hand=self._force(),
@@ -232,8 +236,8 @@ def ended(
     return [float(criterion.outcome(device, case.balance(), span_m, mean_m)), span_m, mean_m, felt]
 
 
-def draw(seed: int, index: int, kind: str, hand: str = "press") -> Case:
-    """One of the random clients, and what the hand does."""
+def draw(seed: int, index: int, kind: str, hand: str = "press", come_in_s: float = COME_IN_S) -> Case:
+    """One of the random clients, what the hand does, and how its coupling comes in."""
     random_ = random.Random(f"{seed}:{index}:{kind}")
 
     def between(low: float, high: float) -> float:
@@ -262,6 +266,7 @@ def draw(seed: int, index: int, kind: str, hand: str = "press") -> Case:
         hand_n_per_m=random_.uniform(40.0, 200.0),
         seed=random_.randrange(1 << 30),
         hand=hand,
+        come_in_s=come_in_s,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
+from hapticd.config.remote import COME_IN_S
 from hapticd_studies.grid.job import Job, block_cells, block_sizes, in_order
 from hapticd_studies.grid.journal import Row
 from hapticd_studies.law_spec import LawSpec
@@ -45,6 +46,7 @@ class RemotePlan:
         window: constant dampers more that tell each client's window; none tells no window.
         ladder: whether the ladder is climbed.
         hand: what the hand does to the random clients.
+        come_in_s: in which all couplings come to their stiffness, under laws and dampers alike [s].
     """
 
     seed: int
@@ -54,6 +56,7 @@ class RemotePlan:
     window: Sequence[LawSpec]
     ladder: bool
     hand: str = "press"
+    come_in_s: float = COME_IN_S
 
     @property
     def all_laws(self) -> list[LawSpec]:
@@ -63,7 +66,8 @@ class RemotePlan:
     @property
     def random(self) -> list[Case]:
         """The random clients, kind by kind."""
-        return [draw(self.seed, index, kind, self.hand) for kind in KINDS for index in range(self.count)]
+        each = [(kind, index) for kind in KINDS for index in range(self.count)]
+        return [draw(self.seed, index, kind, self.hand, self.come_in_s) for kind, index in each]
 
     @property
     def work(self) -> list[tuple[Case, list[LawSpec]]]:
@@ -90,8 +94,8 @@ class RemotePlan:
         if not self.ladder:
             return []
         none = [law for law in self.laws if law.name == "none"]
-        found = [(case, list(self.laws)) for kind in KINDS for case in _ladder(kind)]
-        return found + [(case, none) for case in _ladder(TAMED) if none]
+        found = [(case, list(self.laws)) for kind in KINDS for case in _ladder(kind, self.come_in_s)]
+        return found + [(case, none) for case in _ladder(TAMED, self.come_in_s) if none]
 
     def job(self) -> Job:
         """Cut into blocks."""
@@ -103,6 +107,7 @@ class RemotePlan:
             "window": [_plain(law) for law in self.window],
             "ladder": self.ladder,
             "hand": self.hand,
+            "come_in_s": self.come_in_s,
         }
         names = tuple(sorted({law.name for law in self.all_laws}))
         return Job(_block, spec, block_sizes(len(self.work), _MOST_CASES), names, interpreted=True)
@@ -115,9 +120,15 @@ class RemotePlan:
         return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
 
 
-def _ladder(kind: str) -> list[Case]:
+def _ladder(kind: str, come_in_s: float) -> list[Case]:
     return [
-        Case(f"{kind} {rate_hz:g} Hz {delay_s * 1e3:g} ms", kind, stiffness, Network(rate_hz, delay_s))
+        Case(
+            f"{kind} {rate_hz:g} Hz {delay_s * 1e3:g} ms",
+            kind,
+            stiffness,
+            Network(rate_hz, delay_s),
+            come_in_s=come_in_s,
+        )
         for rate_hz in RATES_HZ
         for delay_s in DELAYS_S
         for stiffness in LADDER_N_PER_M
@@ -130,7 +141,8 @@ def _plain(law: LawSpec) -> dict[str, Any]:
 
 def _block(spec: dict[str, Any], block: int, threads: int | None) -> list[Row]:
     laws, dampers, window = ([LawSpec(**each) for each in spec[name]] for name in ("laws", "dampers", "window"))
-    work = RemotePlan(spec["seed"], spec["count"], laws, dampers, window, spec["ladder"], spec["hand"]).work
+    more = {name: spec[name] for name in ("seed", "count", "ladder", "hand", "come_in_s")}
+    work = RemotePlan(laws=laws, dampers=dampers, window=window, **more).work
     return [_became(*work[at]) for at in block_cells(block_sizes(len(work), _MOST_CASES), block)]
 
 

@@ -33,6 +33,8 @@ stiffness_n_per_m = 2000.0
 damping_n_s_per_m = 5.0
 max_force_n = {MOST_N}
 """
+PROMPT = "come_in_s = 0.0\n"
+"""Of a coupling: it comes in by the ramp alone."""
 FORCE_PORT = """
 [[scene.forces]]
 name = "field"

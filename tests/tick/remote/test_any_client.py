@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hapticd.tick.remote.follower import HASTE_PER_S
 from hapticd.tick.remote.streamed_force import BLEND_S
-from tests.tick.remote.rig import COUPLING, FORCE_PORT, MOST_N, PERIOD_S, RAMP_S, Rig, apart, length
+from tests.tick.remote.rig import COUPLING, FORCE_PORT, MOST_N, PERIOD_S, PROMPT, RAMP_S, Rig, apart, length
 
 K, B, FASTEST = 2000.0, 5.0, 1.0
 BALL = """
@@ -52,11 +52,16 @@ MESSAGES = st.lists(
 
 
 @settings(max_examples=8, deadline=None)
-@given(messages=MESSAGES, law=st.sampled_from(["none", "tdpa", "late-cycle", "ring-damping"]), shake=st.booleans())
+@given(
+    messages=MESSAGES,
+    law=st.sampled_from(["none", "tdpa", "late-cycle", "ring-damping"]),
+    shake=st.booleans(),
+    soft=st.booleans(),
+)
 def test_each_port_stays_within_its_limit_and_the_books_balance(
-    messages: list[tuple[int, str, dict[str, Any]]], law: str, shake: bool
+    messages: list[tuple[int, str, dict[str, Any]]], law: str, shake: bool, soft: bool
 ) -> None:
-    rig = Rig(COUPLING + FORCE_PORT, law=law, axes="xyz")
+    rig = Rig(COUPLING + ("come_in_s = 0.07\n" if soft else PROMPT) + FORCE_PORT, law=law, axes="xyz")
     n = 0
     for wait, name, fields in messages:
         rig.say(name, **fields)

@@ -57,14 +57,16 @@ def test_a_client_that_moves_the_target_moves_the_spring(axes: str) -> None:
     assert port.target_m == pytest.approx(target_m)
 
 
-def test_it_begins_at_the_device_and_goes_to_the_target_no_faster_than_told() -> None:
-    rig = Rig()
+@pytest.mark.parametrize(("law", "ticks"), [("late-cycle", 300), ("none", 80)])
+def test_it_begins_at_the_device_and_goes_to_the_target_no_faster_than_told(law: str, ticks: int) -> None:
+    rig = Rig(law=law)
     rig.go([0.02])
     rig.say("tool", position_m=[-0.98])
     assert rig.go() == pytest.approx([0.0], abs=1e-12)
     assert rig["tool"].target_m == [0.02]
     was_m, was_n = 0.02, 0.0
-    for _ in range(80):
+    for _ in range(ticks):
+        rig.say("tool", position_m=[-0.98])
         (now_n,) = rig.go()
         (now_m,) = rig["tool"].target_m
         assert 0.0 <= was_m - now_m <= FASTEST * PERIOD_S * (1.0 + 1e-9)
@@ -117,9 +119,10 @@ def test_a_client_that_is_silent_is_let_go_by_a_ramp_and_told_of_once() -> None:
     assert rig["tool"].seq == -1
 
 
+@pytest.mark.parametrize("law", ["late-cycle", "none"])
 @pytest.mark.parametrize("silence", [110, 130, 149, 151, 400])
-def test_it_comes_back_by_a_ramp_wherever_the_silence_ended(silence: int) -> None:
-    rig = Rig()
+def test_it_comes_back_by_a_ramp_wherever_the_silence_ended(silence: int, law: str) -> None:
+    rig = Rig(law=law)
     held_at(rig, [2e-3], 300)
     rig.go(ticks=silence)
     assert told(rig) is PortState.STALE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -115,3 +116,40 @@ def test_a_spring_of_forces_that_come_late_is_held_by_a_law_that_counts_energy(l
     without, held = swing("none"), swing(law)
     assert without > 2e-3
     assert held < 0.25 * without
+
+
+def test_its_law_is_shown_a_contact_without_depth_that_it_may_divide_by_and_without_a_spring() -> None:
+    rig = Rig(FORCE_PORT, axes="xyz")
+    for _ in range(50):
+        rig.say("field", force_n=[1.0, -1.0, 0.5])
+        rig.go()
+        shown = [channel.tick for channel in rig["field"].channels]
+        assert [each.in_contact for each in shown] == [True] * 3
+        assert [each.spring_n for each in shown] == [0.0] * 3
+        assert all(-1e-12 < each.x_m < 0.0 for each in shown)
+    assert [each.contact_n for each in shown] == [1.0, -1.0, 0.5]
+
+
+def test_on_a_device_that_is_slower_than_the_loop_a_force_is_gone_over_to_as_slowly() -> None:
+    """A sample comes every 20 ms: the whole way lay between two of them, and came with the second one all at once."""
+    rig = Rig(FORCE_PORT, nominal_rate_hz=50.0)
+    forces_n = [0.0]
+    for number in range(300):
+        rig.say("field", force_n=[3.0 if number < 205 else -3.0])
+        (force_n,) = rig.go() if number % 20 == 10 else rig.repeat()
+        forces_n.append(force_n)
+    changes_n = [after - before for before, after in itertools.pairwise(forces_n)]
+    assert max(map(abs, changes_n)) <= 3.0 * PERIOD_S / BLEND_S + 1e-9
+    assert forces_n[205] == pytest.approx(3.0)
+    assert forces_n[205 + round(2.0 * BLEND_S / PERIOD_S)] == pytest.approx(-3.0)
+
+
+def test_what_a_law_takes_off_stays_as_it_was_until_the_next_sample() -> None:
+    rig = Rig(FORCE_PORT, law="damper")
+    for number in range(100):
+        rig.say("field", force_n=[1.0])
+        rig.go([1e-5 * number])
+    (before_n,) = rig.force
+    assert before_n < 0.95
+    rig.say("field", force_n=[2.0])
+    assert rig.repeat(10) == pytest.approx([before_n + 1.0])

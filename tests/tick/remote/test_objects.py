@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 from itertools import pairwise
 
@@ -96,6 +97,21 @@ def test_it_is_followed_no_faster_than_told_and_no_thin_plate_goes_past_the_devi
         was = now
     assert was > 0.02
     assert rig.force[2] > MOST_N  # it holds the device in front
+
+
+def test_what_a_client_moves_goes_on_where_the_device_comes_by_what_stays() -> None:
+    ways = []
+    for others in ("", BALL.replace('"ball"', '"other"').replace("[0.0, 0.0, -0.05]", "[0.3, 0.1, 0.0]")):
+        rig = Rig(BALL + others.replace("remote = true", ""), axes="xyz")
+        rig.go([0.3, 0.0, 0.2])
+        rig.say("ball", position_m=[0.0, 0.0, -0.05], velocity_m_per_s=[0.0, 0.0, 0.2])
+        for n in range(30):
+            rig.go([0.3 - 0.012 * n, 0.0, 0.2])
+            assert rig["ball"].state is PortState.HELD
+        ways.append(rig["ball"].target_m)
+    alone, beside = ways
+    assert beside == alone
+    assert alone[2] > -0.046
 
 
 def test_a_ball_that_turns_drags_a_device_that_sticks_to_it_and_the_books_balance() -> None:
@@ -289,3 +305,18 @@ def test_what_a_client_moves_is_no_part_of_what_rests_beside_it() -> None:
     assert isinstance(rig.tick, SpaceTick)
     assert [contact.solid.name for contact in rig.tick.solids] == ["still", "ball"]
     assert [port.name for port in rig.ports] == ["ball"]
+
+
+def test_one_that_is_gone_is_let_go_of_without_a_collector() -> None:
+    """The loop has none, which would stop it for as long as it looks."""
+    rig = Rig(BALL, axes="xyz")
+    rig.go([0.0, 0.0, -0.021], ticks=3)
+    rig.switch("")
+    gc.collect()
+    gc.disable()
+    try:
+        rig.go(ticks=100)
+        assert rig.force == [0.0, 0.0, 0.0]
+        assert gc.collect() == 0
+    finally:
+        gc.enable()

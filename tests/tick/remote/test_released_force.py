@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import pytest
+
 from hapticd.tick.remote.port import PortState
 from tests.tick.remote.rig import FORCE_PORT, Rig, update
 
@@ -35,3 +39,26 @@ def test_after_letting_go_the_same_force_is_a_new_one() -> None:
         rig.say("field", force_n=[1.0])
         rig.go(ticks=10)
     assert rig.force == [1.0]
+
+
+def released(rig: Rig) -> None:
+    """By its client."""
+    rig["field"].take(update(rig.seq + 1, released=True))
+
+
+def begun_anew(rig: Rig) -> None:
+    """As after a calibration."""
+    rig.tick.start(rig.sample)
+
+
+@pytest.mark.parametrize("end", [released, begun_anew])
+def test_how_long_a_force_may_stand_counts_from_its_own_beginning(end: Callable[[Rig], None]) -> None:
+    rig = Rig(FORCE_PORT)
+    for _ in range(2):
+        for _ in range(98):
+            rig.say("field", force_n=[1.0])
+            rig.go(ticks=10)
+            assert rig["field"].state is PortState.HELD
+        end(rig)
+        assert rig["field"].state is not PortState.HELD
+        rig.go(ticks=5)
