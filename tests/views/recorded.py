@@ -23,6 +23,7 @@ def write_recording(
     left_out: range = range(0),
     late_us: Sequence[float] = (),
     receipt: dict[str, Any] | None = None,
+    later: Sequence[dict[str, Any]] = (),
 ) -> Path:
     """Write it.
 
@@ -34,6 +35,7 @@ def write_recording(
         left_out: ticks that did not arrive.
         late_us: how late each tick was; 10 us where not given.
         receipt: what the receipt says otherwise.
+        later: what the receipts of reloads say otherwise, their timestamps at least.
     """
     wall = run.config.scene.walls[0]
     status = Status(
@@ -74,6 +76,8 @@ def write_recording(
             records.append(Cycle(at_s, seq, 0, cycle, columns["energy_j"][seq], 1e-5, 0.0, 0.03))
         for record in records:
             file.add(record, at_s)
+    for changed in later:
+        file.describe(METADATA, as_texts({**told, **changed}))
     for one in more:
         file.add(one, one.timestamp)
     file.close()

@@ -14,13 +14,20 @@ import pytest
 import hapticd
 from hapticd.cli import main
 from hapticd.errors import HapticdError
+from hapticd.figures.picture import save
+from hapticd.figures.sheets import draw
 from hapticd.offline.run import Run
+from hapticd.telemetry.records import Event
+from hapticd.tick.event import EventCode
+from hapticd_views.report.page import page
+from hapticd_views.report.statement import statements
 from hapticd_views.source import Source, open_source
 from tests.daemon.running import HAPTICD, Daemon
-from tests.views.recorded import write_recording
+from tests.views.recorded import EPOCH_S, write_recording
 
 CONFIG = Path(__file__).parent.parent.parent / "config"
 WALL = CONFIG / "wall-12-energy-cycle.toml"
+OTHER_BYTES = b"\xff".decode(errors="surrogateescape")
 OTHER_SIDE = (
     WALL.read_text().replace("stiffness_n_per_m = 12000.0", 'stiffness_n_per_m = 12000.0\nfree_side = "negative"')
     + "\n"
@@ -73,11 +80,44 @@ def test_a_wall_whose_free_side_is_negative_is_drawn_the_same_way_round(tmp_path
     assert curves["force_n"].max() > 3.0
 
 
+def test_a_file_whose_name_is_no_utf_8_is_drawn(folder: Path, tmp_path: Path) -> None:
+    """Its name stands in the picture; matplotlib's error of types was said to be a defect."""
+    for kind in ("csv", "mcap"):
+        path = tmp_path / f"{OTHER_BYTES}.{kind}"
+        path.write_bytes((folder / f"run.{kind}").read_bytes())
+        source = open_source(path)
+        assert source.name == f"\ufffd.{kind}"
+        save(draw("position", source.curves, source.name), path.with_suffix(".svg"))
+        assert path.with_suffix(".svg").stat().st_size
+
+
 def test_a_device_in_free_space_is_drawn_axis_by_axis(tmp_path: Path, run: Run) -> None:
     free: dict[str, Any] = {"wall_axis": [], "wall_position_m": [], "wall_stiffness_n_per_m": []}
     source = open_source(write_recording(tmp_path / "free.mcap", run, WALL.read_text(), receipt=free))
     assert [curves.name for curves in source.curves] == ["free.mcap z"]
     assert not source.curves[0].inside.any()
+
+
+def test_a_run_that_was_reloaded_is_drawn_at_the_wall_that_was_in_force(tmp_path: Path, run: Run) -> None:
+    """All of it was drawn at the wall of its beginning. The status comes 20 ms after the last tick of before."""
+    moved = WALL.read_text().replace("12000.0", "8000.0\nposition_m = 0.004\nfree_side = 'negative'")
+    walls = {"wall_position_m": [0.004], "wall_stiffness_n_per_m": [8000.0]}
+    later = {**walls, "timestamp": EPOCH_S + 0.52, "config_text": moved, "config_hash": "moved", "law": "tdpa"}
+    gone = {"wall_axis": [], "wall_position_m": [], "wall_stiffness_n_per_m": [], "timestamp": EPOCH_S + 0.8}
+    switched = Event(EPOCH_S + 0.5, 500, EventCode.SWITCHED, "", {"config": "moved"})
+    path = tmp_path / "two.mcap"
+    source = open_source(write_recording(path, run, WALL.read_text(), more=[switched], later=[later, gone]))
+    assert source.recording is not None
+    assert np.bincount(source.recording.in_force).tolist() == [501, 299, 200]
+    (curves,) = source.curves
+    assert curves["x_m"][:501] == pytest.approx(run.x_measured_m[:501], abs=1e-15)
+    assert curves["x_m"][501:] == pytest.approx(0.004 - run.x_measured_m[501:800], abs=1e-15)
+    assert curves["force_n"][501:].tolist() == (-run.force_n[501:800]).tolist()
+    assert np.isnan((curves.stiffness_n_per_m, curves.rest_m)).all()
+    shown = page(source, statements(source)).decode()
+    assert "with energy-cycle, then tdpa, then energy-cycle" in shown
+    assert all(f"before {at} s" in shown for at in ("0.520", "0.800"))
+    assert "position_m = 0.004" in shown
 
 
 def test_missing_ticks_are_missing(tmp_path: Path, run: Run) -> None:

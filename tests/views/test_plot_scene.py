@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hapticd.cli import main
+from hapticd.config.loading import load
+from hapticd.errors import ConfigError
+from hapticd_views.recording import read
 from hapticd_views.scene import scene
-from hapticd_views.source import open_source
+from hapticd_views.source import Source, open_source
 from tests.daemon.running import HAPTICD
+from tests.views.replay.simulated import record
 
 BALL = Path(__file__).parents[2] / "config" / "ball.toml"
 
@@ -40,6 +45,25 @@ def test_the_device_is_drawn_where_it_was_and_its_proxy_on_the_ball(run: Path) -
 def test_a_stretch_is_cut_out(run: Path) -> None:
     figure = scene(open_source(run), run, BALL, 0.1, 0.2, "")
     assert np.size(figure.axes[0].lines[0].get_xdata()) == 101
+
+
+def test_a_recording_that_was_reloaded_is_drawn_among_the_objects_that_were_there(tmp_path: Path) -> None:
+    """It was drawn among those of its beginning: a ball that is larger from then on held nothing."""
+    record(tmp_path / "ball.mcap", load(BALL), 400)
+    made = read(tmp_path / "ball.mcap")
+    larger = BALL.read_text().replace("radius_m = 0.03", "radius_m = 0.032")
+    later = {**made.receipt, "timestamp": made.ticks["timestamp"][200], "config_text": larger, "config_hash": "larger"}
+    made = replace(made, receipts=(made.receipt, later))
+    source = Source("ball.mcap", (), made)
+    with pytest.raises(ConfigError, match=r"objects changed at 0\.19950 s: draw it with --to or --from"):
+        scene(source, made.path, None, 0.0, math.inf, "")
+    for from_s, to_s, radius_mm in ((0.0, 0.1995, 30.0), (0.1995, math.inf, 32.0)):
+        figure = scene(source, made.path, None, from_s, to_s, "")
+        path, _, proxy, _ = (np.array(line.get_data()) for line in figure.axes[1].lines)
+        assert path.shape[1] == 200
+        held = np.isfinite(proxy[0])
+        assert held.sum() > 20
+        assert np.hypot(*proxy[:, held]) == pytest.approx(radius_mm, abs=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from hapticd.config.loading import load
+from hapticd.config.loading import LoadedConfig, load
 from hapticd.errors import ConfigError
 from hapticd.figures.space import views
 from hapticd.shapes.proxy import follow, place
 from hapticd.shapes.solid import Proxy
-from hapticd.tick.space.solid import compile_objects
+from hapticd.tick.space.solid import at_once, compile_objects
+from hapticd_views.recording import Recording
 from hapticd_views.source import Source, table
 
 Points = npt.NDArray[np.float64]
@@ -30,13 +31,14 @@ def scene(source: Source, file: Path, config: Path | None, from_s: float, to_s: 
     Args:
         source: the run.
         file: it is in.
-        config: that was run; a recording has its own.
+        config: that was run; a recording has its own, and is drawn in the objects of one of them.
         from_s: the first moment that is drawn, since the first tick [s].
         to_s: the last one [s].
         title: above it.
 
     Raises:
-        ConfigError: the run is not one of three axes, or its scene is not known.
+        ConfigError: the run is not one of three axes, its scene is not known, or a reload changed it between the two
+            moments.
         HapticdError: a recording holds no configuration.
     """
     time_s, path = _path(source, file)
@@ -46,12 +48,30 @@ def scene(source: Source, file: Path, config: Path | None, from_s: float, to_s: 
     if config is not None:
         loaded = load(config)
     elif source.recording is not None:
-        loaded = source.recording.config
+        loaded, first = _in_force(source.recording, shown, time_s)
+        path, shown = path[first:], shown[first:]
     else:
         raise ConfigError(f"{source.name}: which scene? give the configuration that was run: --config FILE")
-    solids = [solid.proxy for solid in compile_objects(loaded.config.scene.objects, loaded.config.loop.period_s)]
+    solids = [
+        solid.proxy for solid in at_once(compile_objects(loaded.config.scene.objects, loaded.config.loop.period_s))
+    ]
     held = _held(solids, path)
     return views(path[shown], solids, None if held is None else held[shown], title)
+
+
+def _in_force(recording: Recording, shown: npt.NDArray[np.bool_], time_s: Points) -> tuple[LoadedConfig, int]:
+    """The configuration of the ticks that are shown, and the first tick that had its objects."""
+    in_force = recording.in_force
+    rows = np.flatnonzero(shown)
+    config = recording.config_of(recording.receipts[in_force[rows[0]]])
+    for row in rows[np.flatnonzero(np.diff(in_force[rows]))].tolist():
+        other = recording.config_of(recording.receipts[in_force[row + 1]])
+        if other.config.scene.objects != config.config.scene.objects:
+            at_s = 0.5 * (time_s[row] + time_s[row + 1])
+            file = recording.path.name
+            raise ConfigError(f"{file}: its objects changed at {at_s:.5f} s: draw it with --to or --from then")
+    others = np.flatnonzero(in_force[: rows[0]] != in_force[rows[0]])
+    return config, int(others[-1]) + 1 if len(others) else 0
 
 
 def _path(source: Source, file: Path) -> tuple[Points, Points]:

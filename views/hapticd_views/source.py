@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,9 +60,14 @@ def open_source(path: Path) -> Source:
     if path.suffix not in SUFFIXES:
         raise ConfigError(f"{path}: must end in .mcap (hapticd record), or in .csv or .npz (hapticd simulate)")
     if path.suffix == ".mcap":
-        return recorded(path.name, read(path))
+        return recorded(written(path), read(path))
     columns = {name: column for name, column in table(path).items() if name in Row._fields}
-    return Source(path.name, (Curves(path.name, columns),), None)
+    return Source(written(path), (Curves(written(path), columns),), None)
+
+
+def written(path: Path) -> str:
+    """The name of a file as it can be drawn and written, whatever bytes it is of."""
+    return os.fsencode(path.name).decode(errors="replace")
 
 
 def table(path: Path) -> Columns:
@@ -90,7 +96,9 @@ def recorded(name: str, recording: Recording) -> Source:
     ticks = recording.ticks
     if "position_m" not in ticks or not len(ticks["timestamp"]):
         raise HapticdError(f"{name}: holds no tick with a position")
-    if not recording.receipt["wall_axis"]:
+    receipts = [recording.receipts[number] for number in np.unique(recording.in_force).tolist()]
+    stiffness = {receipt["wall_stiffness_n_per_m"][0] for receipt in receipts if receipt["wall_axis"]}
+    if not stiffness:
         return Source(name, _axes(name, recording), recording)
     columns = recording.wall(0)
     ended = sorted(cycle.timestamp for cycle in recording.cycles if cycle.contact == 0)
@@ -98,8 +106,11 @@ def recorded(name: str, recording: Recording) -> Source:
         columns["cycle"] = np.searchsorted(ended, ticks["timestamp"], side="right")
     if "damping_n_s_per_m" in columns:
         columns["damping_n_s_per_m"] = np.nan_to_num(columns["damping_n_s_per_m"])  # of a wall that a reload took away
-    stiffness = recording.receipt["wall_stiffness_n_per_m"][0]
-    return Source(name, (Curves(name, columns, stiffness, _rest_m(recording)),), recording)
+    there = np.isfinite(columns["x_m"])  # the wall, which may have come or gone with a reload
+    columns = {key: column[there] for key, column in columns.items()}
+    commanded = stiffness.pop() if len(stiffness) == 1 else math.nan
+    rest_m = _rest_m(recording, receipts[0]) if len(receipts) == 1 else math.nan
+    return Source(name, (Curves(name, columns, commanded, rest_m),), recording)
 
 
 def listen(daemon: DaemonClient, duration_s: float, stopped: Callable[[], bool]) -> Source:
@@ -113,7 +124,7 @@ def listen(daemon: DaemonClient, duration_s: float, stopped: Callable[[], bool])
     with tempfile.TemporaryDirectory(prefix="hapticd-") as folder:
         path = Path(folder) / "live.mcap"
         Recorder(daemon, path, Limits()).run(stopped, duration_s)
-        return recorded("live", read(path))
+        return recorded("live", replace(read(path), path=Path("live")))  # the file is gone with the folder
 
 
 def _axes(name: str, recording: Recording) -> tuple[Curves, ...]:
@@ -138,10 +149,10 @@ def _axes(name: str, recording: Recording) -> tuple[Curves, ...]:
     )
 
 
-def _rest_m(recording: Recording) -> float:
+def _rest_m(recording: Recording, receipt: dict[str, Any]) -> float:
     """Where hand and walls balance, which is known of a simulated hand only [m]."""
     try:
-        config = recording.config
+        config = recording.config_of(receipt)
         return balance(simulation_options(config), config.config.scene.walls).x_m
     except HapticdError:
         return math.nan

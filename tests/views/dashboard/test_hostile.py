@@ -51,6 +51,7 @@ def viewer(served: Served, token: str = "", **changed: Any) -> Iterator[ClientCo
 
 def open_socket(served: Served, **changed: Any) -> ClientConnection:
     settings: dict[str, Any] = {"origin": Origin(served.watch.rstrip("/")), "compression": None, "max_size": None}
+    settings["open_timeout"] = PATIENCE_S
     socket: ClientConnection = connect(f"ws://127.0.0.1:{served.port}/live", **(settings | changed))
     return socket
 
@@ -95,6 +96,11 @@ def close_code(socket: ClientConnection) -> int:
             socket.recv(PATIENCE_S)
     assert socket.close_code is not None
     return socket.close_code
+
+
+def said(daemon: Daemon) -> list[str]:
+    """The log but for what a busy computer brings about, which may come at any time."""
+    return [line for line in daemon.output().splitlines() if not line.endswith(" deadlines were missed at once")]
 
 
 def is_well(served: Served) -> None:
@@ -158,13 +164,13 @@ def test_nothing_but_the_page_is_to_be_had(served: Served, path: str) -> None:
 @pytest.mark.parametrize("token", ["", "x", "ü"])
 @pytest.mark.parametrize("do", ["arm", "disarm", "clear", "edit"])
 def test_without_the_token_nothing_is_commanded(served: Served, daemon: Daemon, do: str, token: str) -> None:
-    before = daemon.output()
+    before = said(daemon)
     request = {"do": do, **({"hash": "", "law": "none", "values": {}} if do == "edit" else {})}
     with viewer(served, token) as socket:
         answer = answered(socket, request)
     assert answer["ok"] is False
     assert "read only" in answer["text"]
-    assert daemon.output() == before
+    assert said(daemon) == before
     assert daemon.config.read_text() == CONFIG
 
 

@@ -11,9 +11,12 @@ import pyarrow.parquet
 import pytest
 
 from hapticd_views.recording import Recording, read
+from hapticd_views.recording.export import export as export_table
 from hapticd_views.recording.export import single_columns
 from tests.daemon.running import HAPTICD
 from tests.views.recording.made import make
+
+OTHER_BYTES = b"\xff".decode(errors="surrogateescape")
 
 
 @pytest.fixture(scope="module")
@@ -101,3 +104,10 @@ def test_what_cannot_be_exported_is_said_in_one_line(
     assert done.returncode == 2
     assert words in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_table_may_have_a_name_that_is_no_utf_8(recording: Recording, tmp_path: Path) -> None:
+    for suffix in ("csv", "npz", "parquet"):
+        output = tmp_path / f"{OTHER_BYTES}.{suffix}"
+        assert export_table(recording, output) == len(recording.ticks["run"])
+        assert output.stat().st_size

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -126,6 +127,7 @@ def test_a_file_cut_at_any_byte_is_read_up_to_its_last_whole_chunk(
     assert len(ticks) == min(kept * CHUNK_TICKS, TICKS)
     # Its end is in the data section: a cut behind that only loses the index.
     assert recording.complete == (at >= ends[-1] and not recording.cut)
+    assert "last 0 bytes" not in recording.cut, "where a kill between two records cuts"
     mended = path.with_name("mended.mcap")
     count, why = repair(cut, mended, overwrite=True)
     assert why == recording.cut
@@ -179,6 +181,7 @@ def test_a_file_that_is_there_stays(tmp_path: Path) -> None:
 FILL = """
 import sys
 from pathlib import Path
+from typing import Any
 from tests.views.recording.made import files_up_to, make
 make(Path(sys.argv[1]), 3000, 40)
 """
@@ -253,3 +256,27 @@ def test_what_its_configuration_names_beside_itself_is_looked_for_there_and_not_
         assert [each.config.scene.objects[0].model_dump()["file"] for each in (config, other)] == 2 * [
             "/lab/ring.field"
         ]
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"law": None, "axes": None}, "its receipt does not say axes, law"),
+        ({"wall_position_m": ["0"]}, "its receipt does not say wall_position_m"),
+        ({"wall_axis": ["y"]}, "the walls in its receipt do not fit each other or the axes"),
+        ({"wall_axis": ["z", "x"]}, "the walls in its receipt do not fit each other or the axes"),
+    ],
+)
+def test_a_receipt_that_was_damaged_or_forged_is_refused_by_name(
+    tmp_path: Path, changed: dict[str, Any], said: str
+) -> None:
+    """Plots and reports ended with a bare KeyError, said to be a defect of theirs."""
+    receipt = {**make_receipt(STATUS, ANSWER), **changed}
+    path = tmp_path / "forged.mcap"
+    file = RecordingFile(path)
+    file.describe(METADATA, as_texts({key: value for key, value in receipt.items() if value is not None}))
+    file.close()
+    with pytest.raises(HapticdError) as refused:
+        read(path)
+    what = "the file was damaged or changed after it was recorded: take its original"
+    assert str(refused.value) == f"{path}: is no recording of hapticd: {said}; {what}"

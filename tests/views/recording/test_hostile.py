@@ -13,11 +13,12 @@ import msgpack
 import pytest
 
 from hapticd.client import DaemonClient, RefusedKeyError
-from hapticd.errors import ConfigError
+from hapticd.errors import ConfigError, HapticdError
 from hapticd.telemetry.records import Event, Position, Record
 from hapticd.telemetry.wire import Topic
 from hapticd_views.recording import read
 from hapticd_views.recording.recorder import Limits, Recorder
+from hapticd_views.source import listen
 from tests.views.recording.made import STATUS, Publisher, Recording
 
 HOSTILE = [
@@ -147,6 +148,14 @@ def test_no_file_of_an_older_recording_ends_one_whose_files_follow_each_other(
         assert [path for path in tmp_path.iterdir() if path.suffix == ".mcap"] == [taken]
         Recorder(daemon, tmp_path / "long.mcap", Limits()).run(lambda: True)
     assert read(tmp_path / "long.mcap").complete
+
+
+def test_a_daemon_that_is_listened_to_is_called_live_and_not_by_a_file_that_is_gone(publisher: Publisher) -> None:
+    """One of 0.2.0 gives no configuration, and `hapticd plot live` then named a file below /tmp."""
+    with connected(publisher, DaemonClient) as daemon:
+        publisher.say(*(Position(STATUS.timestamp + seq, seq, *4 * ((0.5, 0.5),)) for seq in range(9)))
+        with pytest.raises(HapticdError, match=r"^live: has no configuration: "):
+            listen(daemon, 0.5, lambda: False)
 
 
 @contextlib.contextmanager

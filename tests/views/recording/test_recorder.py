@@ -56,6 +56,15 @@ def runtime(daemon: Daemon) -> dict[str, str]:
     return {"HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
 
 
+def test_a_topic_that_there_is_not_is_a_misuse_and_leaves_no_file(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [HAPTICD, "record", "--topics", "position,foo"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("hapticd: Invalid value for '--topics': 'foo' is not one of position, energy, ")
+    assert not list(tmp_path.iterdir())
+
+
 def test_every_tick_marker_and_the_receipt_are_in_it(
     daemon: Daemon, runtime: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,11 +157,17 @@ def test_a_kill_costs_half_a_second_at_most(daemon: Daemon, runtime: dict[str, s
 
 
 def test_files_follow_each_other_without_a_lost_tick(runtime: dict[str, str], tmp_path: Path) -> None:
-    arguments = ("--max-size", "0.1", "--topics", "position,timing", "--duration", "3")
+    """What is overwritten had more of them, which were read as if they were of this recording."""
+    for number in range(1, 30):
+        (tmp_path / f"long-{number:03d}.mcap").write_text("of the recording before")
+    other = tmp_path / "long-2024.mcap"
+    other.write_text("of another one")
+    arguments = ("--max-size", "0.1", "--topics", "position,timing", "--duration", "3", "--overwrite")
     with Recording(tmp_path / "long.mcap", *arguments, environment=runtime) as recording:
         code, output, _ = recording.ended()
     assert code == 0
-    files = sorted(tmp_path.iterdir())
+    assert other.read_text() == "of another one"
+    files = sorted(file for file in tmp_path.iterdir() if file != other)
     assert [file.name for file in files[:2]] == ["long-001.mcap", "long-002.mcap"]
     assert f"long-001.mcap to {files[-1].name}: " in output
     made = [read(file) for file in files]

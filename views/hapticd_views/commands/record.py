@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hapticd.cli.group import Overview
-from hapticd.errors import HapticdError
+from hapticd.errors import ConfigError, HapticdError
 from hapticd.paths import DEFAULT_INSTANCE
 from hapticd_views.commands.signals import stop_signals
 
@@ -74,7 +74,7 @@ def record(
         from hapticd_views.recording.recorder import MOST_UNREAD, Limits, Recorder
     from hapticd.client import connect as connected
 
-    path = output or Path(f"hapticd-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.mcap")
+    path = _mcap(output or Path(f"hapticd-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.mcap"))
     size_bytes = None if max_size_mb is None else max_size_mb * 1e6
     wanted: dict[str, Any] = {"receive_high_water": MOST_UNREAD}
     if topics is not None:
@@ -125,7 +125,7 @@ def repair(file: File, output: Output, overwrite: Overwrite = False) -> None:
     """Make a complete file of one that was cut: all that can be read, with an index."""
     with _extra():
         from hapticd_views.recording.repair import repair as repaired
-    count, cut = repaired(file, output, overwrite)
+    count, cut = repaired(file, _mcap(output), overwrite)
     typer.echo(f"{output}: {count} messages; {file} {f'ends early: {cut}' if cut else 'is complete'}")
 
 
@@ -138,8 +138,22 @@ def _extra() -> Iterator[None]:
         raise HapticdError(f"recordings need {error.name}: pip install 'hapticd[record]'") from None
 
 
+def _mcap(path: Path) -> Path:
+    """The file that is to be written, whose name has to say what it is: readers go by it."""
+    if path.suffix != ".mcap":
+        raise ConfigError(f"{path}: must end in .mcap; `hapticd record export` makes .csv, .parquet and .npz of one")
+    return path
+
+
 def _split(topics: list[str]) -> list[str]:
-    return [one for given in topics for one in given.replace(",", " ").split()]
+    from hapticd.telemetry.wire import Topic
+
+    found = [one for given in topics for one in given.replace(",", " ").split()]
+    known = [topic.removeprefix("hapticd/") for topic in Topic]
+    for one in found:
+        if one.removeprefix("hapticd/") not in known:
+            raise typer.BadParameter(f"{one!r} is not one of {', '.join(known)}", param_hint="'--topics'")
+    return found
 
 
 @contextmanager

@@ -87,6 +87,8 @@ class Dashboard:
             async with serving:
                 ready()
                 await self._feed.run()
+        except BrokenPipeError:
+            raise  # standard output, where it is said that it is ready
         except OSError as error:
             advice = "; name another --port" if error.errno in (errno.EADDRINUSE, errno.EACCES) else ""
             raise ClientError(f"{self._address.url}: {error.strerror}{advice}") from None

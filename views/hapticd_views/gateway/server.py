@@ -98,6 +98,8 @@ class Gateway:
             async with serving:
                 ready()
                 await asyncio.Event().wait()
+        except BrokenPipeError:
+            raise  # standard output, where it is said that it is ready
         except OSError as error:
             advice = "; name another --port" if error.errno in (errno.EADDRINUSE, errno.EACCES) else ""
             raise ClientError(f"{self._address.live[0]}: {error.strerror}{advice}") from None

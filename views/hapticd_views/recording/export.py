@@ -71,7 +71,8 @@ def _write_csv(table: Table, path: Path) -> None:
 
 def _write_parquet(table: Table, path: Path) -> None:
     columns = {name: _parquet_column(values) for name, values in single_columns(table).items()}
-    pyarrow.parquet.write_table(pyarrow.table(columns), path)
+    with path.open("xb") as file:  # of its own, pyarrow opens only names that are UTF-8
+        pyarrow.parquet.write_table(pyarrow.table(columns), file)
 
 
 def _parquet_column(values: Values) -> Any:

@@ -20,7 +20,7 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.version import __version__
 from hapticd_views.recording.messages import encoder_of, schema_of, topic_of
-from hapticd_views.recording.output import place
+from hapticd_views.recording.output import being_recorded, hold, place
 
 LIBRARY = f"hapticd {__version__}"
 """What the header of a recording names as its writer."""
@@ -44,7 +44,7 @@ class RecordingFile:
         size: bytes on the disk.
 
     Raises:
-        ConfigError: it cannot be created there.
+        ConfigError: it cannot be created there, or another recorder is writing it.
         DiskError: the disk is full.
     """
 
@@ -55,9 +55,13 @@ class RecordingFile:
         self._pending = BytesIO()
         self._writer = Writer(cast("IO[bytes]", _Counted(self)), chunk_size=1 << 22)
         self._channels: dict[type[Any], tuple[int, Any]] = {}
-        flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | (os.O_TRUNC if overwrite else os.O_EXCL)
+        flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | (0 if overwrite else os.O_EXCL)
         try:
             self._fd = os.open(self.path, flags, 0o666)
+            if not hold(self._fd):
+                os.close(self._fd)
+                raise being_recorded(path)
+            os.ftruncate(self._fd, 0)
         except OSError as error:
             raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
         self._writer.start(library=LIBRARY)
@@ -99,18 +103,22 @@ class RecordingFile:
         """Return when it is on the disk: a power cut loses nothing of it.
 
         Raises:
-            DiskError: the disk failed; the file is closed.
+            DiskError: the disk failed, or the file was removed and cannot be read any more; it is closed.
         """
         try:
             os.fdatasync(self._fd)
+            names = os.fstat(self._fd).st_nlink
         except OSError as error:
             self._give_up(error)
+        if not names:
+            os.close(self._fd)
+            raise DiskError(f"{self.path}: was removed while it was recorded; the recording ends, and it is lost")
 
     def close(self) -> None:
         """Write the index, and close.
 
         Raises:
-            DiskError: there was no room for it; the file is readable without.
+            DiskError: there was no room for it, and the file is readable without; or the file was removed.
         """
         self._writer.finish()
         self._write_out()

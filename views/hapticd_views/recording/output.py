@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +16,7 @@ def place(path: Path, overwrite: bool) -> Path:
     """Where a file of this name goes: behind a link, what it leads to.
 
     Raises:
-        ConfigError: something is there already, or it is no place for a file.
+        ConfigError: something is there already, a recording is being written to it, or it is no place for a file.
     """
     place = path.resolve() if path.is_symlink() else path
     reason = obstacle(place)
@@ -23,9 +24,38 @@ def place(path: Path, overwrite: bool) -> Path:
         raise ConfigError(f"{place}: {reason}")
     if place.exists() and not overwrite:
         raise ConfigError(f"{path}: exists; add --overwrite to replace it")
+    if place.exists() and not _free(place):
+        raise being_recorded(path)
     if not place.parent.is_dir():
         raise ConfigError(f"{path}: there is no directory {place.parent}")
     return place
+
+
+def being_recorded(path: Path) -> ConfigError:
+    """The error for a file that another recorder is writing."""
+    return ConfigError(f"{path}: is being recorded; end that recording first, or name another --output")
+
+
+def hold(descriptor: int) -> bool:
+    """Hold an open file for this process alone, as a recorder does, until it is closed; False where another does."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        pass  # a file system without locks: there is no telling
+    return True
+
+
+def _free(path: Path) -> bool:
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError:
+        return True  # it cannot be looked at; writing it will say why
+    try:
+        return hold(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from mcap.records import Channel, Message, Metadata, Schema
 
 from hapticd.errors import HapticdError
 from hapticd_views.recording.columns import Values, columns_of, rows_of
+from hapticd_views.recording.fit import checked
 from hapticd_views.recording.messages import GAP, NOTE, Note, RecordedGap
 from hapticd_views.recording.receipt import METADATA, from_texts
 from hapticd_views.recording.recording import Recording
@@ -85,11 +87,11 @@ class _ReadIn:
             )
         return Recording(
             path=scan.path,
-            receipts=tuple(self._receipts),
+            receipts=tuple(sorted(self._receipts, key=itemgetter("timestamp"))),
             topics={
-                name.removeprefix(_TELEMETRY): _table(topic)
+                name.removeprefix(_TELEMETRY): checked(name, _table(topic))
                 for name, topic in self._topics.items()
-                if name.startswith(_TELEMETRY)
+                if name.startswith(_TELEMETRY) and topic.payloads
             },
             gaps=tuple(RecordedGap(**row) for row in self._rows(GAP)),
             notes=tuple(Note(**row) for row in self._rows(NOTE)),

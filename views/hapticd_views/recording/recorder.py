@@ -15,6 +15,7 @@ from hapticd.telemetry.records import Gap, Position, Record, Status, Tick
 from hapticd.telemetry.wire import Topic
 from hapticd_views.recording.file import RecordingFile
 from hapticd_views.recording.messages import Note, recorded_gap
+from hapticd_views.recording.output import place
 from hapticd_views.recording.receipt import METADATA, as_texts, make_receipt
 
 CHUNK_S = 0.4
@@ -124,6 +125,7 @@ class Recorder:
         began_s = self._synced_s = time.monotonic()
         self._refuse_taken()
         self._begin_file()
+        self._drop_left()
         try:
             while not stopped() and (duration_s is None or time.monotonic() - began_s < duration_s):
                 self._take(self._receive(_WAIT_S))
@@ -145,19 +147,36 @@ class Recorder:
 
     def _refuse_taken(self) -> None:
         """A file of an older recording would end this one when its turn comes, hours later perhaps."""
-        if not self._limits.rotate or self._overwrite or not self._output.parent.is_dir():
+        if not self._limits.rotate or not self._output.parent.is_dir():
             return
         like = re.compile(rf"{re.escape(self._output.stem)}-\d{{3,}}{re.escape(self._output.suffix)}")
         taken = sorted(path.name for path in self._output.parent.iterdir() if like.fullmatch(path.name))
-        if taken:
+        if self._overwrite:
+            for name in taken:
+                place(self._output.with_name(name), overwrite=True)  # another recorder may be writing it
+        elif taken:
             raise ConfigError(
                 f"{self._output.with_name(taken[0])}: exists, and would be one of the files; name another --output, or "
                 "add --overwrite"
             )
 
+    def _drop_left(self) -> None:
+        """Files of a recording that is replaced are no part of this one, which may have fewer."""
+        number = 2
+        while self._limits.rotate and (left := self._part(number)).is_file():
+            try:
+                left.unlink()
+            except OSError as error:
+                raise ConfigError(
+                    f"{left}: is of the recording before and cannot be removed: {error.strerror}"
+                ) from None
+            number += 1
+
+    def _part(self, number: int) -> Path:
+        return self._output.with_stem(f"{self._output.stem}-{number:03d}")
+
     def _begin_file(self) -> None:
-        number = len(self.progress.files) + 1
-        path = self._output.with_stem(f"{self._output.stem}-{number:03d}") if self._limits.rotate else self._output
+        path = self._part(len(self.progress.files) + 1) if self._limits.rotate else self._output
         self._file = RecordingFile(path, self._overwrite)
         self.progress.files.append(path)
         self._committed_s = self._file_since_s = time.monotonic()

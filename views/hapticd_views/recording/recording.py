@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import HapticdError
 from hapticd.telemetry.records import Cycle, Event
 from hapticd.tick.event import EventCode
 from hapticd_views.recording.columns import Values
+from hapticd_views.recording.fit import widened
 from hapticd_views.recording.messages import Note, RecordedGap
 
 PER_TICK = ("position", "energy", "damping", "timing")
@@ -61,10 +63,19 @@ class Recording:
             HapticdError: the recorder could not get it.
             ConfigError: this installation cannot use it, for example for want of a driver.
         """
-        if not self.receipt["config_text"]:
-            raise HapticdError(f"{self.path}: has no configuration: {self.receipt['config_missing']}")
-        file = Path(self.receipt["config_file"])
-        return parse(self.receipt["config_text"], f"{self.path}: {file.name}", file.parent)
+        return self.config_of(self.receipt)
+
+    def config_of(self, receipt: dict[str, Any]) -> LoadedConfig:
+        """The configuration of one of its receipts.
+
+        Raises:
+            HapticdError: the recorder could not get it.
+            ConfigError: this installation cannot use it, for example for want of a driver.
+        """
+        if not receipt["config_text"]:
+            raise HapticdError(f"{self.path}: has no configuration: {receipt['config_missing']}")
+        file = Path(receipt["config_file"])
+        return parse(receipt["config_text"], f"{self.path}: {file.name}", file.parent)
 
     @property
     def missing(self) -> int:
@@ -73,8 +84,17 @@ class Recording:
 
     @cached_property
     def ticks(self) -> dict[str, Values]:
-        """The topics with a message every tick side by side: the ticks that are in all of them."""
-        tables = [self.topics[name] for name in PER_TICK if name in self.topics]
+        """The topics with a message every tick side by side: the ticks that are in all of them.
+
+        Raises:
+            HapticdError: they have fewer columns than the device axes, or the scene walls.
+        """
+        try:
+            tables = [widened(name, self.topics[name], self.receipts) for name in PER_TICK if name in self.topics]
+        except ValueError as error:
+            raise HapticdError(
+                f"{self.path}: {error}: the file was changed, or what was recorded is no hapticd"
+            ) from None
         if not tables:
             return {}
         keys = [list(zip(table["run"].tolist(), table["seq"].tolist(), strict=True)) for table in tables]
@@ -89,6 +109,26 @@ class Recording:
                 elif name not in joined:
                     joined[name] = values[rows]
         return joined
+
+    @cached_property
+    def in_force(self) -> npt.NDArray[np.int64]:
+        """Which of `receipts` was in force in each of `ticks`.
+
+        A receipt follows the status that tells of a reload; which tick was the last one before it, its event says.
+        """
+        since: list[float] = []
+        before = -np.inf
+        for receipt in self.receipts[1:]:
+            told = [
+                event.timestamp
+                for event in self.events
+                if event.code == EventCode.SWITCHED
+                and event.fields.get("config") == receipt["config_hash"]
+                and before < event.timestamp <= receipt["timestamp"]
+            ]
+            before = receipt["timestamp"]
+            since.append(float(np.nextafter(told[-1], np.inf)) if told else before)
+        return np.asarray(np.searchsorted(since, self.ticks["timestamp"], side="right"), np.int64)
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
@@ -115,23 +155,32 @@ class Recording:
         """What happened at one wall, as columns named as those of `hapticd.simulate`.
 
         `x_m` is measured, relative to the wall and negative inside it; forces push out of it when positive; `t_s`
-        counts from the first tick, across restarts too. Energies are of all contacts.
+        counts from the first tick, across restarts too. Energies are of all contacts. Where it was reloaded, each tick
+        has the wall of its own configuration, and NaN where that has none.
 
         Raises:
             HapticdError: no such wall, or without its configuration it is not known which side of it is free.
         """
-        axes, names = self.receipt["axes"], self.receipt["wall_axis"]
-        if not 0 <= index < len(names):
-            raise HapticdError(f"{self.path}: has {len(names)} walls, and no wall {index}")
-        axis = axes.index(names[index]) if len(axes) > 1 else 0
-        outward = 1.0 if self.config.config.scene.walls[index].free_side == "positive" else -1.0
+        walls = max(len(receipt["wall_axis"]) for receipt in self.receipts)
+        if not 0 <= index < walls:
+            raise HapticdError(f"{self.path}: has {walls} walls, and no wall {index}")
         ticks = self.ticks
+        rows = np.arange(len(ticks["timestamp"]))
+        axis, outward, place_m = np.zeros(len(rows), np.int64), *np.full((2, len(rows)), np.nan)
+        for number in np.unique(self.in_force).tolist():
+            receipt = self.receipts[number]
+            if index < len(receipt["wall_axis"]):
+                its, axes = self.in_force == number, receipt["axes"]
+                axis[its] = axes.index(receipt["wall_axis"][index]) if len(axes) > 1 else 0
+                free_side = self.config_of(receipt).config.scene.walls[index].free_side
+                outward[its] = 1.0 if free_side == "positive" else -1.0
+                place_m[its] = receipt["wall_position_m"][index]
         found = {"t_s": ticks["timestamp"] - ticks["timestamp"][0]}
         if "position_m" in ticks:
-            found["x_m"] = outward * (ticks["position_m"][:, axis] - self.receipt["wall_position_m"][index])
-            found["v_m_per_s"] = outward * ticks["velocity_m_per_s"][:, axis]
-            found["force_n"] = outward * ticks["force_n"][:, axis]
-            found["force_requested_n"] = outward * ticks["force_requested_n"][:, axis]
+            found["x_m"] = outward * (ticks["position_m"][rows, axis] - place_m)
+            found["v_m_per_s"] = outward * ticks["velocity_m_per_s"][rows, axis]
+            found["force_n"] = outward * ticks["force_n"][rows, axis]
+            found["force_requested_n"] = outward * ticks["force_requested_n"][rows, axis]
         for name in ("energy_j", "spring_energy_j", "dissipated_j", "generated_j", "late_us", "busy_us", "dt_s"):
             if name in ticks:
                 found[name] = ticks[name]

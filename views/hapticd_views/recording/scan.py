@@ -21,6 +21,8 @@ from hapticd.errors import ConfigError, HapticdError
 _LARGEST_RECORD = 1 << 28
 _BROKEN = (McapError, EOFError, struct.error, ValueError, zstandard.ZstdError, MemoryError, OverflowError, RuntimeError)
 
+_NO_END = "it has no end, as where the recorder was killed"
+
 
 class Scan:
     """One way through a file.
@@ -55,7 +57,7 @@ class Scan:
                     if isinstance(record, DataEnd):
                         self.cut = ""
                         return
-                self.cut = "it has no end"
+                self.cut = _NO_END
             except InvalidMagic as error:
                 if not self.intact_bytes:
                     raise HapticdError(f"{self.path}: is no MCAP file") from error
@@ -65,7 +67,7 @@ class Scan:
                     raise HapticdError(f"{self.path}: is no MCAP file: it is too short for one") from error
                 left = file.seek(0, 2) - self.intact_bytes
                 why = str(error) or type(error).__name__
-                self.cut = f"cut or damaged: the last {left} bytes cannot be read ({why})"
+                self.cut = f"cut or damaged: the last {left} bytes cannot be read ({why})" if left else _NO_END
             except OSError as error:
                 raise HapticdError(f"{self.path}: cannot be read: {error.strerror}") from error
 

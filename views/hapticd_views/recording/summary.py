@@ -63,6 +63,6 @@ def _first(rows: list[str]) -> list[str]:
 
 def _time(timestamp: float) -> str:
     try:
-        return f"{datetime.fromtimestamp(timestamp, UTC):%Y-%m-%d %H:%M:%S.%f}"[:-3]
+        return f"{datetime.fromtimestamp(timestamp, UTC).replace(tzinfo=None).isoformat(' ', 'milliseconds')} UTC"
     except (OverflowError, ValueError, OSError):
         return f"{timestamp:g} s"

@@ -8,6 +8,7 @@ from hapticd.figures.picture import encoded
 from hapticd.figures.sheets import PAGE_IN, printed
 from hapticd_views.replay.replay import Replay
 from hapticd_views.replay.scores import Trace
+from hapticd_views.source import written
 
 _ROW_IN, _FRAME_IN = 0.85, 0.9
 
@@ -31,7 +32,7 @@ def picture(replay: Replay, suffix: str) -> bytes:
                 if law is laws[-1]:
                     axes.set_xlabel("time [s]")
             row[0].set_ylabel(law.name, rotation=0.0, horizontalalignment="right", verticalalignment="center")
-        figure.suptitle(f"{replay.file.name}: the hand's {replay.hand} replayed; grey: recorded", fontsize=8.5)
+        figure.suptitle(f"{written(replay.file)}: the hand's {replay.hand} replayed; grey: recorded", fontsize=8.5)
         return encoded(figure, suffix)
 
 

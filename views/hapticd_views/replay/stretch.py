@@ -95,9 +95,7 @@ def longest_stretch(recording: Recording, most_s: float | None = None) -> Stretc
     ticks = recording.ticks
     if len(ticks["seq"]) < 2:
         raise HapticdError(f"{recording.path}: has no ticks to replay")
-    receipts = sorted(recording.receipts, key=lambda receipt: float(receipt["timestamp"]))
-    since = np.array([receipt["timestamp"] for receipt in receipts[1:]])
-    in_force: Any = np.searchsorted(since, ticks["timestamp"], side="right")
+    in_force = recording.in_force
     breaks = (np.diff(ticks["seq"]) != 1) | (np.diff(ticks["run"]) != 0) | (np.diff(in_force) != 0)
     edges = [0, *(np.nonzero(breaks)[0] + 1).tolist(), len(ticks["seq"])]
     start, end = max(pairwise(edges), key=lambda span: span[1] - span[0])
@@ -106,7 +104,7 @@ def longest_stretch(recording: Recording, most_s: float | None = None) -> Stretc
     start += 0 if inside else int(free[0])
     if most_s is not None:
         end = min(end, start + max(2, 1 + round(most_s * recording.receipt["rate_hz"])))
-    receipt = receipts[int(in_force[start])]
+    receipt = recording.receipts[int(in_force[start])]
     axes = len(receipt["axes"])  # another part may be of a device with more
     return Stretch(
         ticks={

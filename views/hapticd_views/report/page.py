@@ -6,6 +6,7 @@ import base64
 import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import groupby
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -13,6 +14,7 @@ from hapticd.figures.picture import encoded
 from hapticd.figures.sheets import draw
 from hapticd.offline.outcome import Criterion
 from hapticd.version import __version__
+from hapticd_views.recording import Recording
 from hapticd_views.report.statement import Statement
 from hapticd_views.report.timeline import Happening, timeline
 from hapticd_views.source import Source
@@ -78,7 +80,7 @@ def page(source: Source, told: Sequence[Statement]) -> bytes:
     _figures(body, source)
     if source.recording is not None:
         _happenings(body, timeline(source.recording))
-        _receipt(body, source.recording.receipt)
+        _receipts(body, source.recording)
     else:
         _text(body, "h2", "Receipt")
         _text(body, "p", "None: a file of hapticd simulate holds the columns alone. A recording has its receipt.")
@@ -130,10 +132,20 @@ def _happenings(body: Element, found: Sequence[Happening]) -> None:
         _text(body, "p", f"{len(found) - MOST_LINES} more are in the recording.")
 
 
-def _receipt(body: Element, receipt: Mapping[str, Any]) -> None:
+def _receipts(body: Element, recording: Recording) -> None:
     _text(body, "h2", "Receipt")
+    before: Mapping[str, Any] = {}
+    for number, receipt in enumerate(recording.receipts):
+        if number:
+            since_s = receipt["timestamp"] - recording.ticks["timestamp"][0]
+            _text(body, "h3", f"After the reload or restart before {since_s:.3f} s")
+        _receipt(body, receipt, [key for key in _RECEIPT if not number or receipt.get(key) != before.get(key)])
+        before = receipt
+
+
+def _receipt(body: Element, receipt: Mapping[str, Any], keys: Sequence[str]) -> None:
     table = _table(body, ())
-    for key in _RECEIPT:
+    for key in keys:
         value = receipt.get(key, "")
         row = SubElement(table, "tr")
         _text(row, "th", key)
@@ -151,7 +163,8 @@ def _subtitle(source: Source) -> str:
         return f"{seconds}, {len(curves['t_s'])} ticks, simulated"
     receipt = source.recording.receipt
     began = datetime.fromtimestamp(source.recording.ticks["timestamp"][0], UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    return f"{seconds}, {len(curves['t_s'])} ticks, {receipt['device']} with {receipt['law']}, {began}"
+    laws = ", then ".join(law for law, _ in groupby(one["law"] for one in source.recording.receipts))
+    return f"{seconds}, {len(curves['t_s'])} ticks, {receipt['device']} with {laws}, {began}"
 
 
 def _table(body: Element, heads: Sequence[str]) -> Element:

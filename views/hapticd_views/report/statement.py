@@ -42,7 +42,7 @@ class Statement:
 def statements(source: Source) -> list[Statement]:
     """What there is to say of a run."""
     recording = source.recording
-    in_space = recording is not None and bool(recording.receipt.get("object_name"))
+    in_space = recording is not None and any(receipt.get("object_name") for receipt in recording.receipts)
     told = [_stability(judge(source.curves[0]), in_space), _law(source.curves[0], recording)]
     if recording is not None:
         told += [_faults(recording), _machine(source.curves[0], recording)]
@@ -117,7 +117,7 @@ def _machine(curves: Curves, recording: Recording) -> Statement:
     text.append(f"{missing} ticks are missing in the recording." if missing else "No tick is missing.")
     if recording.cut:
         text.append(f"The file ends early: {recording.cut}.")
-    if not recording.receipt.get("realtime", False):
+    if not all(receipt["realtime"] for receipt in recording.receipts):
         text.append("The loop was not real-time.")
     good = not overruns and not missing and not recording.cut
     return Statement("What did the machine do?", "good" if good else "bad", " ".join(text), numbers)
