@@ -123,7 +123,10 @@ def _make_daemons_own(force: bool) -> None:
     clients = directory.clients()
     pair = directory.make(force)
     typer.echo(f"made the daemon's pair in {directory.path}; its public key is {pair.public}")
-    typer.echo("every listed client needs that key in its file" if clients else "what comes next: hapticd keys")
+    if clients:
+        typer.echo(f"every listed client needs that key in its file; {_reminder()}")
+    else:
+        typer.echo("what comes next: hapticd keys")
 
 
 def _make_on_the_clients_computer(name: str, server_key: str, force: bool) -> None:

@@ -35,6 +35,7 @@ def port_limits(scene: SceneConfig) -> list[PortLimits]:
                 each.max_force_n,
                 each.max_speed_m_per_s,
                 driven=each.driven,
+                come_in_s=each.come_in_s,
             )
             for each in scene.couplings
         ),

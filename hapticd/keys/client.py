@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import struct
@@ -91,7 +92,10 @@ class CurveClient:
         Raises:
             zmq.ZMQError: ZeroMQ cannot use the endpoint.
         """
-        self._socket.connect(self._endpoint)
+        try:
+            self._socket.connect(self._endpoint)
+        except UnicodeEncodeError:
+            raise zmq.ZMQError(errno.EINVAL) from None
 
     def wait(self, timeout_s: float | None) -> bool:
         """Whether a message has come in time.

@@ -5,11 +5,14 @@ from __future__ import annotations
 import grp
 import os
 import re
+import shlex
+import stat
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hapticd.errors import ConfigError
 from hapticd.keys.file import Key, KeyWriteError, new_pair, read, write
+from hapticd.paths import home_directory
 
 SYSTEM_KEYS = Path("/etc/hapticd/keys")
 """The system service's own."""
@@ -50,6 +53,9 @@ def key_directory() -> Path:
 
     $HAPTICD_KEYS_DIR, else keys/ in systemd's $CONFIGURATION_DIRECTORY, else /etc/hapticd/keys for root, else
     $XDG_CONFIG_HOME/hapticd/keys, which is ~/.config/hapticd/keys where that is not set.
+
+    Raises:
+        ConfigError: none of these is set and this user has no home directory.
     """
     given = os.environ.get("HAPTICD_KEYS_DIR")
     if given:
@@ -59,7 +65,8 @@ def key_directory() -> Path:
         return Path(unit) / "keys"
     if os.geteuid() == 0:
         return SYSTEM_KEYS
-    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "hapticd" / "keys"
+    home = os.environ.get("XDG_CONFIG_HOME") or home_directory("HOME or HAPTICD_KEYS_DIR") / ".config"
+    return Path(home) / "hapticd" / "keys"
 
 
 class KeyDirectory:
@@ -76,7 +83,7 @@ class KeyDirectory:
         """The daemon's own pair; None when none has been made.
 
         Raises:
-            ConfigError: it cannot be used.
+            ConfigError: it cannot be used, or everybody may change it.
         """
         path = self.path / _SERVER
         try:
@@ -94,7 +101,7 @@ class KeyDirectory:
         """Listed keys by name, in the order of names.
 
         Raises:
-            ConfigError: one of them cannot be used, or two are the same.
+            ConfigError: one of them cannot be used, everybody may change what is listed, or two are the same.
         """
         clients: dict[str, Key] = {}
         names: dict[str, Path] = {}
@@ -134,7 +141,8 @@ class KeyDirectory:
         path = self._client(name)
         for other, listed in self.clients().items():
             if other != name and listed.public == key.public:
-                raise ConfigError(f"{name}: that key is listed already: `hapticd keys add {other} --force` changes it")
+                change = f"hapticd keys add {other} {shlex.quote(key.public)} --force"
+                raise ConfigError(f"{name}: that key is listed already as {other}: `{change}` changes what it may")
         self._write(path, replace(key, secret="", server=""), force)
 
     def remove(self, name: str) -> None:
@@ -144,14 +152,13 @@ class KeyDirectory:
             ConfigError: there is none of that name.
             KeyWriteError: it cannot be removed.
         """
-        path = self._client(name)
+        listed = {path.stem: path for path in self._listed()}  # also those that `add` would not have called so
+        if name not in listed:
+            raise ConfigError(f"{name}: not listed; listed are: {', '.join(listed) or 'none'}")
         try:
-            path.unlink()
-        except FileNotFoundError:
-            known = ", ".join(listed.stem for listed in self._listed()) or "none"
-            raise ConfigError(f"{name}: not listed; listed are: {known}") from None
+            listed[name].unlink(missing_ok=True)
         except OSError as error:
-            raise _denied(path, error) from error
+            raise _denied(listed[name], error) from error
 
     def _client(self, name: str) -> Path:
         if _NAME.fullmatch(name) is None:
@@ -159,8 +166,10 @@ class KeyDirectory:
         return self.path / CLIENTS / f"{name}{_PUBLIC}"
 
     def _listed(self) -> list[Path]:
+        """Files of clients. A hidden one is an editor's, such as a lock; a client left out is only kept out."""
         try:
-            return sorted(path for path in (self.path / CLIENTS).iterdir() if path.suffix == _PUBLIC)
+            found = (self.path / CLIENTS).iterdir()
+            return sorted(path for path in found if path.suffix == _PUBLIC and not path.name.startswith("."))
         except (FileNotFoundError, NotADirectoryError):
             return []
         except OSError:
@@ -169,7 +178,14 @@ class KeyDirectory:
     def _read(self, path: Path) -> Key:
         if path.exists() and not os.access(path, os.R_OK):
             raise self._closed(path)
-        return read(path)
+        key = read(path)
+        for changed in (self.path, path.parent, path):
+            if changed.stat().st_mode & stat.S_IWOTH:
+                raise ConfigError(
+                    f"{changed}: everybody may change it, and so let anyone in: chmod o-w {shlex.quote(str(changed))}, "
+                    "and look who is listed (`hapticd keys`)"
+                )
+        return key
 
     def _closed(self, path: Path) -> ConfigError:
         """The error for keys that root has not given to the service's own user."""

@@ -8,6 +8,7 @@ import resource
 import socket as sockets
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +17,8 @@ import pytest
 import zmq
 
 from hapticd.keys import connections
-from hapticd.keys.connections import DESCRIPTORS, ConnectionBound, local_peer
+from hapticd.keys.connections import DESCRIPTORS, ConnectionBound, descriptor_of, local_peer
+from hapticd.keys.memory import Culprits
 from tests.daemon.test_flood import descriptors, flood
 from tests.telemetry.sockets import wait_until
 
@@ -80,10 +82,11 @@ def test_nothing_grows_while_the_thread_stands_still() -> None:
         wait_until(lambda: taken() <= before, "descriptors again")
 
 
-def test_the_oldest_that_say_nothing_are_dropped() -> None:
+def test_the_oldest_that_say_nothing_are_dropped(caplog: pytest.LogCaptureFixture) -> None:
     with bounded() as (_, _, where), flood(where, 2 * MOST) as opened:
         wait_until(lambda: all(ended(one) for one in opened[:MOST]), "the end of the oldest")
         assert not any(ended(one) for one in opened[MOST:])
+        wait_until(lambda: "more than 20 connections; the oldest that say nothing are dropped" in caplog.text, "a line")
 
 
 def test_who_was_heard_stays_and_the_next_oldest_goes() -> None:
@@ -136,7 +139,30 @@ def test_the_kernel_knows_who_is_at_the_other_end(tmp_path: Path) -> None:
     with ours, theirs:
         assert local_peer(ours.fileno()) == f"user {os.geteuid()}, process {os.getpid()}"
     with (tmp_path / "file").open("w") as file:
+        before = taken()
         assert local_peer(file.fileno()) == ""
+        assert taken() == before
+
+
+def test_of_what_came_by_no_connection_none_is_known() -> None:
+    assert descriptor_of(zmq.Frame(b"said by this process itself")) == -1
+
+
+def test_the_memory_is_looked_at_also_while_no_one_comes_or_goes_and_no_thread_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What fills it is sent by those who are there already."""
+    looks: list[float] = []
+
+    def look(now_s: float) -> Culprits:
+        looks.append(now_s)
+        return Culprits.NO_ONE
+
+    before = set(threading.enumerate())
+    with bounded() as (bound, _, _):
+        monkeypatch.setattr(bound._memory, "turn", look)
+        wait_until(lambda: len(looks) > 2, "a third look")
+    assert set(threading.enumerate()) <= before
 
 
 def test_few_descriptors_are_said_when_no_more_can_be_had(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -191,6 +191,18 @@ def test_a_name_that_no_file_can_have_cannot_be_read() -> None:
         read(Path("a\0b"))
 
 
+def test_a_file_that_may_not_be_read_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Root may read any, so that a refusal is made here."""
+
+    def refuse(path: Path, *_: object) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    write(tmp_path / "a.key", new_pair())
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(ConfigError, match=f"^{tmp_path}/a.key: this user may not read it$"):
+        read(tmp_path / "a.key")
+
+
 def test_a_key_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A computer that loses its power leaves the whole file or none."""
     sizes = []

@@ -284,6 +284,22 @@ def test_an_address_of_ipv6_takes_keys_as_any_other() -> None:
         context.term()
 
 
+def test_who_has_shown_no_key_after_ten_seconds_is_disconnected_and_none_comes_in_where_no_one_is_asked() -> None:
+    """Its questions are closed before its socket is, and between the two lies a moment."""
+    context = zmq.Context()
+    socket = context.socket(zmq.ROUTER)
+    bound = server.CurveServer(socket, "tcp://127.0.0.1:0", SERVER, frozenset({LAPTOP.public}))
+    assert socket.getsockopt(zmq.HANDSHAKE_IVL) == 10_000
+    bound.close()
+    client = Client(context, zmq.DEALER, bound.endpoint, LAPTOP)
+    try:
+        wait_until(client.turned_away, "a refusal")
+    finally:
+        client.close()
+        socket.close(0)
+        context.term()
+
+
 def test_a_hundred_strangers_are_told_of_and_the_log_grows_no_further(caplog: pytest.LogCaptureFixture) -> None:
     """T6: a stranger has as many keys and addresses as it likes."""
     with zmq.Context() as context, context.socket(zmq.ROUTER) as socket:

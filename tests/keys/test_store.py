@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import stat
 from dataclasses import replace
 from pathlib import Path
@@ -60,6 +61,7 @@ def test_the_services_group_reads_its_keys_and_nobody_else(keys: KeyDirectory, m
     keys.add("laptop", new_pair())
     assert modes(keys.path) == {".": 0o750, "server.key_secret": 0o640, "clients": 0o750, "clients/laptop.key": 0o640}
     assert {path.stat().st_gid for path in (keys.path, *keys.path.rglob("*"))} == {group}
+    assert {path.stat().st_uid for path in (keys.path, *keys.path.rglob("*"))} == {os.geteuid()}
 
 
 def test_the_services_group_is_for_root_to_give(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,8 +124,12 @@ def test_a_client_is_removed_by_its_name(keys: KeyDirectory) -> None:
 def test_a_key_has_one_name_since_it_can_have_one_right_only(keys: KeyDirectory) -> None:
     laptop = new_pair()
     keys.add("laptop", laptop)
-    with pytest.raises(ConfigError, match="other: that key is listed already: `hapticd keys add laptop --force`"):
+    with pytest.raises(ConfigError, match="other: that key is listed already as laptop: `hapticd keys add ") as refused:
         keys.add("other", laptop)
+    advice = shlex.split(
+        str(refused.value).split("`")[1]
+    )  # it lacked the key, so that the shell's answer was a refusal
+    assert advice == ["hapticd", "keys", "add", "laptop", laptop.public, "--force"]
     copy = keys.path / "clients" / "copy.key"
     copy.write_text((keys.path / "clients" / "laptop.key").read_text())
     with pytest.raises(ConfigError, match=f"laptop.key: the same key as {copy}"):
@@ -134,9 +140,35 @@ def test_a_key_has_one_name_since_it_can_have_one_right_only(keys: KeyDirectory)
 def test_a_name_that_is_no_file_is_refused(keys: KeyDirectory, name: str) -> None:
     with pytest.raises(ConfigError, match="a client's name has letters"):
         keys.add(name, new_pair())
-    with pytest.raises(ConfigError, match="a client's name has letters"):
+    with pytest.raises(ConfigError, match="not listed; listed are: none"):
         keys.remove(name)
     assert not keys.path.exists()
+
+
+def test_a_file_with_a_name_that_is_refused_can_be_removed_and_nothing_beside_the_list(keys: KeyDirectory) -> None:
+    """Put there by hand, it lets its client in, and the command only said what names may have in them."""
+    keys.make()
+    keys.add("laptop", new_pair())
+    by_hand = keys.path / "clients" / "my viewer.key"
+    (keys.path / "clients" / "laptop.key").rename(by_hand)
+    (keys.path / "beside.key").write_text(by_hand.read_text())
+    assert list(keys.clients()) == ["my viewer"]
+    with pytest.raises(ConfigError, match="beside: not listed; listed are: my viewer"):
+        keys.remove("../beside")
+    keys.remove("my viewer")
+    assert (keys.clients(), by_hand.exists()) == ({}, False)
+    assert (keys.path / "beside.key").exists()
+
+
+def test_what_an_editor_hides_beside_a_client_lists_no_client_and_spoils_no_reload(keys: KeyDirectory) -> None:
+    keys.make()
+    keys.add("laptop", new_pair())
+    listed = keys.clients()
+    clients = keys.path / "clients"
+    (clients / ".#laptop.key").symlink_to("somebody@lab.1234:1700000000")  # as Emacs locks it
+    keys.add("other", new_pair())
+    (clients / "other.key").rename(clients / ".other.key")
+    assert keys.clients() == listed
 
 
 def test_a_file_that_is_no_key_is_named_and_lets_nobody_in(keys: KeyDirectory) -> None:
@@ -165,6 +197,43 @@ def test_keys_that_the_services_user_may_not_read_are_named_with_a_remedy(
         keys.pair()
 
 
+@pytest.mark.parametrize(("look", "asked"), [("stat", "pair"), ("iterdir", "clients")])
+def test_a_directory_that_may_not_be_looked_into_is_named_with_the_remedy(
+    keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch, look: str, asked: str
+) -> None:
+    """Root may look into any, so that a refusal is made here."""
+
+    def refuse(path: Path, **_options: object) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    keys.make()
+    monkeypatch.setattr(Path, look, refuse)
+    with pytest.raises(ConfigError, match=f"this user may not read it.*sudo chgrp -R hapticd {keys.path}"):
+        getattr(keys, asked)()
+
+
+def test_a_client_that_cannot_be_removed_is_named(keys: KeyDirectory) -> None:
+    (keys.path / "clients" / "wall.key").mkdir(parents=True)
+    with pytest.raises(KeyWriteError, match=r"wall\.key: Is a directory"):
+        keys.remove("wall")
+
+
+@pytest.mark.parametrize("changed", [".", "clients", "clients/laptop.key"])
+def test_keys_that_everybody_may_change_let_no_one_in(keys: KeyDirectory, changed: str) -> None:
+    """Any user of the computer could list a key that commands the device."""
+    keys.make()
+    keys.add("laptop", new_pair())
+    place = keys.path / changed
+    mode = place.stat().st_mode
+    place.chmod(mode | stat.S_IWOTH)
+    for look in [keys.clients, keys.pair][: 2 if changed == "." else 1]:
+        with pytest.raises(ConfigError, match=f"{place}: everybody may change it, .*chmod o-w {place},"):
+            look()
+    place.chmod(mode)
+    assert keys.pair()
+    assert list(keys.clients()) == ["laptop"]
+
+
 def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(KeyWriteError, match=f"{tmp_path}/file/keys: Not a directory"):
@@ -179,3 +248,13 @@ def test_a_daemon_that_no_other_computer_reaches_needs_no_keys(tmp_path: Path, m
     for table, address in (("telemetry", "0.0.0.0"), ("control", "127.0.0.1")):
         with pytest.raises(ConfigError, match=f"{table}.tcp = .*: takes keys, and there are none in"):
             key_ring(parse(f"[{table}]\ntcp = 'tcp://{address}:9872'\n", "lab"))
+
+
+def test_a_daemon_that_takes_keys_has_its_own_and_those_of_its_clients(
+    keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HAPTICD_KEYS_DIR", str(keys.path))
+    pair, laptop = keys.make(), new_pair()
+    keys.add("laptop", laptop)
+    ring = key_ring(parse("[control]\ntcp = 'tcp://127.0.0.1:9872'\n", "lab"))
+    assert ring == KeyRing(pair, {"laptop": Key(laptop.public)})
