@@ -2,8 +2,8 @@
 
     open -> (calibrate) -> enable -> read/write ... -> disable -> close
 
-Each step may be called twice; `disable` leaves the device without force whatever has happened. Public methods own
-order and checks, so that a driver only fills in the hooks whose names start with an underscore.
+Each step may be called twice; `disable` leaves the device without force whatever has happened, or says that it could
+not. Public methods own order and checks, so that a driver only fills in the hooks whose names start with an underscore.
 """
 
 from __future__ import annotations
@@ -11,15 +11,23 @@ from __future__ import annotations
 import contextlib
 import enum
 import math
+import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from types import TracebackType
-from typing import ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from pydantic import Field
 
 from hapticd.device import MOST_METRICS, DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
-from hapticd.errors import DeviceProtocolError, DriverError, DriverStateError
+from hapticd.errors import (
+    DeviceDisconnectedError,
+    DeviceProtocolError,
+    DriverError,
+    DriverStateError,
+    HapticdError,
+    in_words,
+)
 from hapticd.settings import Table
 from hapticd.trace import DriverTrace
 
@@ -51,6 +59,9 @@ class DriverState(enum.Enum):
     ENABLED = "enabled"
 
 
+_LATE_ANSWER_S = 0.5
+"""How long a device that is given back may take to say that it has let go, where a tick could not wait for it [s]."""
+
 _CLOSED, _ENABLED = DriverState.CLOSED, DriverState.ENABLED  # Python 3.11 takes 0.1 us to look a member up, each time
 
 
@@ -73,6 +84,7 @@ class Driver(ABC, Generic[OptionsT]):
         metrics: one number for each of `METRICS`, in their order; a driver writes them whenever it likes, from any of
             its threads, which costs a tick no more than storing a number.
         trace: what was last said between driver and device, where a driver keeps that; it is in every fault record.
+        force_left: why the last `disable` or `close` may have left a force on the device; "" when it did not.
     """
 
     Options: ClassVar[type[DriverOptions]] = DriverOptions
@@ -85,11 +97,13 @@ class Driver(ABC, Generic[OptionsT]):
         self.metrics = memoryview(bytearray(8 * MOST_METRICS)).cast("d")
         self.trace = DriverTrace()
         self.state = DriverState.CLOSED
+        self.force_left = ""
         self._info: DeviceInfo | None = None
         self._limit_squared = 0.0
         self._axes = 0
         self._calibrating = False
         self._called_off = False
+        self._may_answer_yet = False
 
     def __enter__(self) -> Self:
         self.open()
@@ -162,13 +176,14 @@ class Driver(ABC, Generic[OptionsT]):
         """Find the device and learn what it is; no force, no motion.
 
         Raises:
-            DriverError: not found, not permitted, busy, or it makes no sense.
+            DriverError: not found, not permitted, busy, or it makes no sense; or `_open` raised what is no such error.
         """
         if self.state is DriverState.CLOSED:
             try:
-                self._info = self._open()
-                if self._info.flaw:  # every limit is made of it
-                    raise DeviceProtocolError(f"{type(self).__name__}: DeviceInfo.{self._info.flaw}")
+                with naming(type(self), "_open"):
+                    self._info = self._open()
+                    if self._info.flaw:  # every limit is made of it
+                        raise DeviceProtocolError(f"{type(self).__name__}: DeviceInfo.{self._info.flaw}")
             except BaseException:
                 self._close()
                 raise
@@ -184,14 +199,15 @@ class Driver(ABC, Generic[OptionsT]):
 
         Raises:
             DriverStateError: not open, force is enabled, or it was called off.
-            DriverError: the device failed to calibrate.
+            DriverError: the device failed to calibrate; or `_calibrate` raised what is no such error.
         """
         if self.state is not DriverState.OPEN:
             raise DriverStateError(f"calibrate: the device is {self.state.value}, it must be open without force")
         self._called_off = False
         self._calibrating = True
         try:
-            self._calibrate()
+            with naming(type(self), "_calibrate"):
+                self._calibrate()
         except DriverError as error:
             if self._called_off:
                 raise DriverStateError("the calibration was called off") from error
@@ -211,12 +227,14 @@ class Driver(ABC, Generic[OptionsT]):
 
         Raises:
             DriverStateError: not open.
-            DriverError: the device refuses, for example while it is not calibrated.
+            DriverError: the device refuses, for example while it is not calibrated; or `_enable` raised what is no such
+                error.
         """
         if self.state is DriverState.CLOSED:
             raise DriverStateError("enable: the device is not open")
         if self.state is DriverState.OPEN:
-            self._enable()
+            with naming(type(self), "_enable"):
+                self._enable()
             self.state = DriverState.ENABLED
 
     def read(self) -> Sample:
@@ -250,17 +268,26 @@ class Driver(ABC, Generic[OptionsT]):
         self._write(force_n)
 
     def disable(self) -> None:
-        """Take the force away, from any state, after any error; never raises."""
+        """Take the force away, from any state, after any error; never raises: `force_left` says whether it is gone."""
         if self.state is DriverState.CLOSED:
             return
         self.call_off()
         self.state = DriverState.OPEN
-        with contextlib.suppress(Exception):  # whatever the device says now, the caller is already letting go
+        self.force_left, self._may_answer_yet = "", False
+        try:
             self._disable()
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - who calls is letting go, and may have other ways to
+            said = isinstance(error, HapticdError)
+            self.force_left = str(error) if said else f"_disable: {in_words(error, type(self).__module__)}"
+            self._may_answer_yet = isinstance(error, DriverError) and not isinstance(error, DeviceDisconnectedError)
 
     def close(self) -> None:
-        """Take the force away and give the device back; never raises."""
+        """Take the force away and give the device back; never raises: `force_left` says whether the force is gone."""
         self.disable()
+        end_s = time.monotonic() + _LATE_ANSWER_S
+        while self._may_answer_yet and time.monotonic() < end_s:  # no tick waits for it any more
+            time.sleep(0.01)
+            self.disable()
         self.state = DriverState.CLOSED
         self._info = None
         with contextlib.suppress(Exception):
@@ -293,8 +320,32 @@ class Driver(ABC, Generic[OptionsT]):
 
     @abstractmethod
     def _disable(self) -> None:
-        """Take the force away; must work from any state, twice, after an error, and not raise."""
+        """Take the force away; must work from any state, twice, after an error.
+
+        Raises:
+            Exception: the force may still be there; the daemon then tries other ways.
+        """
 
     @abstractmethod
     def _close(self) -> None:
         """Release what `_open` took, even half opened; must not raise."""
+
+
+@contextlib.contextmanager
+def naming(driver: type[Driver[Any]], place: str) -> Iterator[None]:
+    """What a driver raises inside is an error in a line that names it, unless it was meant for people.
+
+    Args:
+        driver: what may raise.
+        place: in what of it.
+
+    Raises:
+        DriverError: it did.
+    """
+    try:
+        yield
+    except (HapticdError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        said = in_words(error, driver.__module__)
+        raise DeviceProtocolError(f"driver {driver.__module__}.{driver.__name__}: {place}: {said}") from error

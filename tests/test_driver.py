@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from hapticd.driver import DeviceInfo, Driver, DriverState, Sample
-from hapticd.errors import DeviceNotFoundError, DeviceProtocolError
+from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DeviceProtocolError, DeviceTimeoutError
 from hapticd.simulation.options import SimulationOptions
 from hapticd_drivers.loopback import Loopback
 
@@ -91,9 +91,64 @@ def test_a_device_that_declares_what_none_can_be_is_not_opened(declared: dict[st
     assert driver.state is DriverState.CLOSED
 
 
+@pytest.mark.parametrize("hook", ["_open", "_enable", "_calibrate"])
+def test_what_a_hook_raises_names_driver_hook_and_place(monkeypatch: pytest.MonkeyPatch, hook: str) -> None:
+    """A device that could not be armed for it ended the loop, and a library that exits did so without a word."""
+
+    class Odd(Loopback):
+        pass
+
+    def leave(_: Loopback) -> None:
+        raise SystemExit(7)
+
+    driver = Odd(SimulationOptions(), PERIOD_S)
+    monkeypatch.setattr(Odd, hook, leave)
+    steps = [driver.open, *([] if hook == "_open" else [getattr(driver, hook.removeprefix("_"))])]
+    for step in steps[:-1]:
+        step()
+    with pytest.raises(DeviceProtocolError, match=rf"driver .*Odd: {hook}: SystemExit: 7 \(test_driver\.py:\d+\)"):
+        steps[-1]()
+    assert driver.state is (DriverState.CLOSED if hook == "_open" else DriverState.OPEN)
+
+
 def test_a_sample_shows_its_fields() -> None:
     sample = Sample(2)
     sample.position_m[1] = 0.25
     assert repr(sample).startswith("Sample(")
     assert "position_m=[0.0, 0.25]" in repr(sample)
     assert "calibrated=True" in repr(sample)
+
+
+class Hesitant(Loopback):
+    """Lets go when it is asked for the third time."""
+
+    def __init__(self, error: BaseException) -> None:
+        super().__init__(SimulationOptions(), PERIOD_S)
+        self.error = error
+        self.asked = 0
+
+    def _disable(self) -> None:
+        self.asked += 1
+        if self.asked < 3:
+            raise self.error
+        super()._disable()
+
+
+@pytest.mark.parametrize(
+    ("error", "left"),
+    [
+        (DeviceTimeoutError("busy"), ""),
+        (DeviceDisconnectedError("unplugged"), "unplugged"),
+        (KeyError("x"), "_disable: KeyError: 'x' (test_driver.py:"),
+        (SystemExit(7), "_disable: SystemExit: 7 (test_driver.py:"),
+    ],
+)
+def test_a_device_that_answers_late_is_asked_again_as_it_is_closed(error: BaseException, left: str) -> None:
+    """Where a computer is busy, and a loop could not have waited; what is gone or broken is not asked again."""
+    driver = Hesitant(error)
+    with driver:
+        driver.enable()
+    assert driver.state is DriverState.CLOSED
+    assert driver.force_left.startswith(left)
+    assert bool(driver.force_left) == bool(left)
+    assert driver.asked == (1 if left else 3)

@@ -190,6 +190,7 @@ class DriverContract:
         enabled.read()
         enabled.write(self.a_force(enabled))
         enabled.disable()
+        assert enabled.force_left == ""
         assert not any(self.force_on_device(enabled))
         with pytest.raises(DriverStateError):
             enabled.write(self.a_force(enabled))

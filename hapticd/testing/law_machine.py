@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from hapticd.law import LawTick, Scalar, state_fields
-from hapticd.simulation.compiler.compile import TICK_KINDS, compiled_step, param_kinds, record_dtype
+from hapticd.simulation.compiler.compile import OPTIONS, TICK_KINDS, compiled_step, param_kinds, record_dtype
 
 
 class LawMachine:
@@ -27,7 +29,7 @@ class LawMachine:
     """
 
     def __init__(self, law: ModuleType, state: Any, params: Any) -> None:
-        self._step = compiled_step(law)
+        self._step = _from_python(law)
         self.state = _record(state_fields(law), state)
         self._params = _record(param_kinds(law), params)
         self._tick = _record(TICK_KINDS, LawTick())
@@ -36,6 +38,18 @@ class LawMachine:
         """The force for a tick [N]."""
         _fill(self._tick, TICK_KINDS, tick)
         return float(self._step(self.state, self._params, self._tick))
+
+
+@lru_cache(maxsize=64)
+def _from_python(law: ModuleType) -> Any:
+    """A law's step, for Python to call."""
+    step = compiled_step(law)
+
+    @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
+    def call(state: Any, params: Any, tick: Any) -> Any:
+        return step(state, params, tick)
+
+    return call
 
 
 def _record(kinds: dict[str, type[Scalar]], plain: Any) -> Any:

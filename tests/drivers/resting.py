@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tests.daemon.running import Subscriber
 
 HALF_SECOND = 500
 """Ticks that a handle has to rest for."""
+
+DISTURBANCES = ("unsent_commands", "ticks_without_state")
+"""What a driver counts where this computer had no time for the link: each sets a handle at a wall swinging."""
 
 _LOOK_EVERY = 25
 
@@ -24,10 +27,12 @@ class Rest:
     Attributes:
         swing_m: how far it moved to and fro.
         mean_m: where it was.
+        disturbed: what kept it from rest, besides a law; empty where it rested, or where nothing did.
     """
 
     swing_m: float
     mean_m: float
+    disturbed: str = ""
 
 
 def calmest(endpoint: str, ticks: int, still_m: float) -> Rest:
@@ -44,7 +49,8 @@ def calmest(endpoint: str, ticks: int, still_m: float) -> Rest:
     window: deque[float] = deque(maxlen=HALF_SECOND)
     best = Rest(float("inf"), 0.0)
     with Subscriber(endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
-        if not subscriber.until("hapticd/status")["armed"]:
+        before = subscriber.until("hapticd/status")
+        if not before["armed"]:
             raise DisturbedError("disarmed before")
         seen = 0
         for topic, fields in subscriber.maps():
@@ -57,6 +63,13 @@ def calmest(endpoint: str, ticks: int, still_m: float) -> Rest:
             if len(window) == HALF_SECOND and seen % _LOOK_EVERY == 0:
                 found = Rest(max(window) - min(window), sum(window) / HALF_SECOND)
                 best = min(best, found, key=lambda rest: rest.swing_m)
-                if best.swing_m < still_m or seen >= ticks:
+                if best.swing_m < still_m:
                     return best
+                if seen >= ticks:
+                    after = subscriber.until("hapticd/status")
+                    return replace(best, disturbed=_grown(before["device_metrics"], after["device_metrics"]))
     raise AssertionError("no ticks any more")
+
+
+def _grown(before: dict[str, float], after: dict[str, float]) -> str:
+    return ", ".join(f"{name}: {before[name]} to {after[name]}" for name in DISTURBANCES if after[name] > before[name])

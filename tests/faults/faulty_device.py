@@ -9,6 +9,7 @@ import dataclasses
 import math
 import mmap
 import struct
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +25,8 @@ WITNESS = struct.Struct("<dqqdqq")
 
 HANG_S = 30.0
 ABSENT = ("unplugged", "oserror", "hang-close")
+SILENT = ("clings", "hang-disable")
+"""Lost for the loop, which cannot let go of it either; another process can."""
 
 
 class FaultyOptions(SimulationOptions):
@@ -67,7 +70,7 @@ class Faulty(Loopback):
         order = self._told()
         if order == "hang-read":
             time.sleep(HANG_S)
-        if order in ("unplugged", "hang-close"):
+        if order in ("unplugged", "hang-close", *SILENT):
             raise DeviceDisconnectedError("faulty: unplugged")
         if order == "oserror":
             raise OSError(5, "Input/output error")
@@ -100,6 +103,9 @@ class Faulty(Loopback):
         self._applied(force_n[0], 1)
 
     def _disable(self) -> None:
+        if self._order in SILENT and Path(sys.argv[0]).stem == "process":
+            time.sleep(HANG_S * (self._order == "hang-disable"))
+            raise OSError(5, "Input/output error")
         super()._disable()
         self._applied(0.0, 0)
         if self._order == "hang-close":

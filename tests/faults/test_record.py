@@ -7,6 +7,7 @@ import errno
 import io
 import json
 import os
+import time
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -245,7 +246,12 @@ def test_a_record_for_which_there_is_no_descriptor_left_does_not_end_the_daemon(
     assert recorder.turn(keep=2) == ""
 
 
-def test_the_command_lists_shows_and_exports(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_lists_shows_and_exports(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TZ", "EST5EDT")
+    time.tzset()
+
     def hapticd(*arguments: str) -> str:
         with pytest.raises(SystemExit) as ended:
             main(["fault", *arguments, "--directory", str(path.parent)])
@@ -258,11 +264,14 @@ def test_the_command_lists_shows_and_exports(path: Path, tmp_path: Path, capsys:
     shown = hapticd("show", "014640.000Z-202")
     assert "202 OVER_SPEED: 3 m/s is above the limit" in shown
     assert "2 N before, at most 3 N after, gone after 2 ticks" in shown
+    assert "2001-09-08 21:46:40 -0400, tick " in shown, "its name has the time in UTC"
     assert "position [mm]" in shown
     assert json.loads(hapticd("show", "--json"))["summary"]["ramp_ticks"] == 2
     assert len(hapticd("export").splitlines()) == 25
     hapticd("export", path.stem, "--output", str(tmp_path / "out.csv"))
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 25
+    monkeypatch.undo()
+    time.tzset()
 
 
 def test_a_name_that_fits_no_record_or_several_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

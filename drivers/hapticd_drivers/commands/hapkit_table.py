@@ -49,7 +49,7 @@ def hapkit_table(
         text = header.read_text()
         before = read_table(text)
     except (OSError, UnicodeDecodeError, ConfigError) as error:
-        raise ConfigError(f"{header}: {error}") from None
+        raise ConfigError(f"{header}: {getattr(error, 'strerror', None) or error}") from None
     where = choose(port)
     typer.echo(
         "The motor gets no force. Switch its supply off, take the handle, and swing it to and fro over its", err=True

@@ -5,6 +5,7 @@ Nothing of this has been tried on hardware; what it has been tried on is a fake 
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import math
@@ -12,7 +13,7 @@ from collections.abc import Callable, Sequence
 
 from hapticd.device import DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
 from hapticd.driver import Driver, DriverState
-from hapticd.errors import ConfigError, DeviceFaultError, DriverStateError
+from hapticd.errors import ConfigError, DeviceFaultError, DriverError, DriverStateError
 from hapticd.trace import DriverTrace
 from hapticd_drivers.forcedimension import diagnosis, discovery, presence, settings
 from hapticd_drivers.forcedimension.failures import NOT_AVAILABLE, TIMEOUT, cause_of
@@ -171,7 +172,8 @@ class ForceDimension(Driver[ForceDimensionOptions]):
                 sdk.call("dhdEmulateButton", 1, device)
             sdk.call("dhdSetForceAndTorqueAndGripperForce", *[0.0] * 7, device)
         except BaseException:
-            self._disable()
+            with contextlib.suppress(DriverError):  # the first error says more
+                self._disable()
             raise
 
     def _read(self) -> Sample:
@@ -225,7 +227,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         for _ in range(STOP_ATTEMPTS):
             if sdk.dhdStop(self._id) >= 0:
                 return
-        sdk.dhdEnableForce(0, self._id)
+        sdk.call("dhdEnableForce", 0, self._id)
 
     def _close(self) -> None:
         if self._sdk is not None and self._id >= 0:

@@ -175,8 +175,11 @@ class Inverse3(Driver[Inverse3Options]):
         self.metrics[DROPPED] = float(courier.dropped)
 
     def _disable(self) -> None:
-        if self._courier is not None and self._courier.failed is None:
-            self._let_go()
+        if self._courier is None:
+            return
+        if self._courier.failed is not None:
+            raise self._courier.failed
+        self._let_go()
 
     def _close(self) -> None:
         courier, self._courier = self._courier, None

@@ -184,8 +184,10 @@ class MotorDriver(Driver[MotorOptionsT]):
 
     def _disable(self) -> None:
         crew = self._crew
-        if crew is None or not self._lock.acquire(timeout=1.0):
+        if crew is None:
             return
+        if not self._lock.acquire(timeout=1.0):
+            raise DeviceTimeoutError(f"{self.NAME}: a calibration that was called off has not ended within 1 s")
         try:
             crew.disable()
         finally:

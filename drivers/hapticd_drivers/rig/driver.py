@@ -233,8 +233,10 @@ class RigDriver(Driver[RigOptionsT]):
 
     def _disable(self) -> None:
         talk = self._talk
-        if talk is None or not self._lock.acquire(timeout=1.0):
+        if talk is None:
             return
+        if not self._lock.acquire(timeout=1.0):
+            raise DeviceTimeoutError(f"{self.NAME}: a calibration that was called off has not ended within 1 s")
         try:
             talk.disable(urgent=True)
         finally:

@@ -149,6 +149,7 @@ def test_an_unplugged_device_is_noticed_by_the_next_call(bench: Bench, first: st
     driver.disable()
     driver.close()
     assert driver.state is DriverState.CLOSED
+    assert driver.force_left == "omega7: dhdEnableForce failed: communication error, error 2 (COM)"
     bench.set(present=1)
     driver.open()
     driver.read()

@@ -13,8 +13,6 @@ from tests.drivers.motors.daemon import LIMIT_N_PER_M, STILL_M, config, holds, k
 
 STIFF_N_PER_M = 3.0 * LIMIT_N_PER_M
 
-pytestmark = pytest.mark.timeout(300)
-
 
 class Handle:
     """The cursor's x axis, as the motors' tests push a shaft."""

@@ -97,6 +97,7 @@ def test_what_goes_wrong_is_named_and_no_more_force_is_asked_for(
     assert ticks <= trouble.most_ticks
     assert service.peak_n == pytest.approx(trouble.peak_n)
     driver.close()
+    assert driver.force_left
     assert trouble.row() in PAGE.read_text()
 
 

@@ -34,5 +34,5 @@ class Lab(MotorLab):
     def controller(self, index: int, shaft: Shaft) -> MoteusController:
         return MoteusController(index + 1, shaft)
 
-    def driver(self, period_s: float = 0.001, **keys: Any) -> Moteus:
+    def made(self, period_s: float, **keys: Any) -> Moteus:
         return Moteus(options(self.channel, len(self.controllers), **keys), period_s)

@@ -11,8 +11,6 @@ from tests.drivers.moteus.lab import Lab
 from tests.drivers.motors.daemon_contract import MotorDaemonContract
 from tests.drivers.motors.lab import MOST_N_M, RADIUS_M
 
-pytestmark = pytest.mark.timeout(300)
-
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:

@@ -23,8 +23,8 @@ PUSH_N = 2.0
 WATCHDOG_MS = 20.0
 
 _PAGES = Path(__file__).parents[3] / "docs"
-_TICK_S = 0.005
-"""What a tick waits for a state while a fault is looked for: a busy computer is none."""
+_TICK_S = 0.25
+"""What a tick waits for a state while a fault is looked for, as long as a busy computer may take: it is no fault."""
 
 
 @dataclass(frozen=True)

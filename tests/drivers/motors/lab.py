@@ -49,11 +49,15 @@ class MotorLab(ABC):
         self._monkeypatch = monkeypatch
         self.channel = VIRTUAL if way == SOCKETCAN else str(self._port)
         self.bench = Bench(self._end(), self.controllers)
+        self._drivers: list[MotorDriver[Any]] = []
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
+        """A test that failed has closed no driver; the next is not to fail for it."""
+        for driver in self._drivers:
+            driver.close()
         self.bench.unplug()
 
     @abstractmethod
@@ -61,8 +65,13 @@ class MotorLab(ABC):
         """The controller at a place on the bus."""
 
     @abstractmethod
+    def made(self, period_s: float, **keys: Any) -> MotorDriver[Any]:
+        """The driver for `driver`."""
+
     def driver(self, period_s: float = 0.001, **keys: Any) -> MotorDriver[Any]:
         """A closed driver; its shafts count from the middle and its sign is known unless the keys say otherwise."""
+        self._drivers.append(self.made(period_s, **keys))
+        return self._drivers[-1]
 
     @property
     def first(self) -> Any:

@@ -28,7 +28,7 @@ class Lab(MotorLab):
     def controller(self, index: int, shaft: Shaft) -> OdriveController:
         return OdriveController(index, shaft)
 
-    def driver(self, period_s: float = 0.001, **keys: Any) -> Odrive:
+    def made(self, period_s: float, **keys: Any) -> Odrive:
         common = {"channel": self.channel, "sign_checked": True, "watchdog_ms": 20.0}
         made = {**common, "axes": axes(len(self.controllers), homing="absolute"), **keys}
         return Odrive(OdriveOptions.model_validate(made), period_s)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from hapticd.errors import DeviceFaultError, DriverStateError
 from hapticd_drivers.motors import crew
+from hapticd_drivers.motors.driver import MotorDriver
 from hapticd_drivers.odrive import crew as odrive_crew
-from hapticd_drivers.odrive.driver import Odrive
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
 from tests.drivers.odrive.lab import Lab, axes
@@ -59,7 +60,7 @@ def test_it_tries_the_watchdog_and_finds_the_stop(bench: Lab) -> None:
         again.enable()  # another start of the daemon: it has to be calibrated anew
 
 
-def lose_power(bench: Lab, driver: Odrive) -> None:
+def lose_power(bench: Lab, driver: MotorDriver[Any]) -> None:
     """For a tenth of a second, in ticks that are not armed; then it counts from where its shaft is."""
     bench.first.deaf = True
     bench.first.restart()

@@ -42,7 +42,7 @@ FAULTS = (
     MotorFault("the supply falls", brown_out, DeviceFaultError, "supply is too low", SOON_TICKS),
     MotorFault("switched off and on", lambda made: made.first.restart(), DeviceFaultError, "restarted", SOON_TICKS),
     MotorFault("encoder error", lambda made: made.first.break_down(8), DeviceFaultError, "check encoder", SOON_TICKS),
-    MotorFault("an ODrive is silent", deafen, DeviceTimeoutError, "no heartbeat for 50 ms", 60),
+    MotorFault("an ODrive is silent", deafen, DeviceTimeoutError, "no heartbeat for 50 ms", 60, 0.005),
     MotorFault("the adapter is unplugged", unplug, DeviceDisconnectedError, "gone", 2),
 )
 

@@ -11,8 +11,6 @@ from tests.drivers.rig.serial_lab import ATTEMPTS, HELD_M, PRESS_N, STIFFNESS_N_
 from tests.drivers.rig.test_board_walls import STILL_M as STILL_BY_KIND_M
 from tests.firmware.board import Board, Built
 
-pytestmark = pytest.mark.timeout(300)
-
 TICKS = 1500
 STILL_M = STILL_BY_KIND_M["hapkit"]
 
@@ -22,7 +20,7 @@ def test_a_daemon_holds_a_wall_with_the_default_law_that_shakes_without_one(
     hapkit_parts: Built, tmp_path: Path, law: str, still: bool
 ) -> None:
     """It finds the rig, checks its sign, homes and arms it, as a student does."""
-    rest = pressed(hapkit_parts, tmp_path, law)
+    rest = pressed(hapkit_parts, tmp_path, law, still)
     if still:
         assert rest.swing_m < STILL_M
         assert rest.mean_m == pytest.approx(WALL_M - PRESS_N / STIFFNESS_N_PER_M, abs=1e-4)
@@ -30,8 +28,15 @@ def test_a_daemon_holds_a_wall_with_the_default_law_that_shakes_without_one(
         assert rest.swing_m > 1e-3
 
 
-def pressed(parts: Built, place: Path, law: str) -> Rest:
-    """The calmest half second of a handle that a hand presses into the wall; anew where the loop was disturbed."""
+def pressed(parts: Built, place: Path, law: str, still: bool) -> Rest:
+    """The calmest half second of a handle that a hand presses into the wall; anew where the loop was disturbed.
+
+    Args:
+        parts: of the board.
+        place: a directory for it.
+        law: its name; empty for the default.
+        still: whether it is to rest, so that a handle that does not though the link was disturbed says nothing.
+    """
     said = []
     for _ in range(ATTEMPTS):
         with Board(parts, place / "board", pace="frames") as board:
@@ -41,6 +46,9 @@ def pressed(parts: Built, place: Path, law: str) -> Rest:
                     rest = calmest(lab.press().daemon.endpoint, TICKS, STILL_M)
                 except DisturbedError as disturbed:
                     said.append(str(disturbed))
+                    continue
+                if still and rest.disturbed:
+                    said.append(str(rest))
                     continue
                 lab.daemon.process.terminate()
                 assert lab.daemon.wait_exit() == 0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hapticd_drivers.rig import messages
 from hapticd_drivers.rig.frames import LONGEST_FRAME, FrameReader, framed
-from tests.drivers.rig.vectors import Vector, lines, raw, vectors
+from tests.drivers.rig.vectors import FILE, Vector, lines, raw, vectors
 
 SENT: dict[str, Callable[[Vector], bytes]] = {
     "HELLO": lambda v: messages.hello(v.number("sequence")),
@@ -163,3 +163,16 @@ def test_what_a_rig_calls_itself_can_be_shown_and_moves_no_cursor() -> None:
     said = messages.decode(body + messages.checksum(body).to_bytes(2, "little"))
     assert isinstance(said, messages.Identity)
     assert (said.model, said.serial) == ("a?b?[31m ?~", "7?")
+
+
+def test_host_and_firmware_have_the_same_most_axes_and_the_same_number_for_none() -> None:
+    header = FILE.with_name("message.h").read_text()
+    assert f"RIG_AXES = {messages.MOST_AXES}," in header
+    assert f"RIG_NO_AXIS = {messages.NO_AXIS} " in header
+
+
+@pytest.mark.parametrize(("axes", "known"), [(3, True), (4, False)])
+def test_a_state_of_more_axes_than_a_rig_has_is_of_no_known_length(axes: int, known: bool) -> None:
+    body = pack(f"<BBHHIBBH{2 * axes}i", messages.VERSION, messages.STATE, 1, 1, 0, 0, 0, 0, *range(2 * axes))
+    said = messages.decode(body + messages.checksum(body).to_bytes(2, "little"))
+    assert isinstance(said, messages.State) == known

@@ -17,8 +17,6 @@ from hapticd_drivers.rig import messages
 from tests.daemon.running import PATIENCE_S, Subscriber, wait_until
 from tests.drivers.rig.serial_lab import ATTEMPTS, HELD_M, PRESS_N, STIFFNESS_N_PER_M, WALL_M, Lab, on_a_board, until
 
-pytestmark = pytest.mark.timeout(300)
-
 
 @on_a_board(-0.04, "low_switch")
 def test_a_rig_is_identified_homed_enabled_and_holds_a_wall(lab: Lab) -> None:

@@ -118,6 +118,7 @@ def test_an_unplugged_rig_is_lost_and_found_again(rig: Rig, pushing: SerialRig) 
     with pytest.raises(DeviceDisconnectedError, match="unplugged"):
         tick(rig, pushing, 1.0)
     pushing.close()
+    assert "unplugged" in pushing.force_left
     with pytest.raises(DeviceNotFoundError, match="is the rig plugged in"):
         pushing.open()
     rig.plug()
@@ -218,3 +219,11 @@ def test_what_does_not_fit_the_rig_is_refused_by_its_key(
 ) -> None:
     with pytest.raises(ConfigError, match=says):
         make_driver(**options).open()
+
+
+def test_a_calibration_that_does_not_end_is_not_taken_for_a_force_that_is_gone(pushing: SerialRig) -> None:
+    with pushing._lock:
+        pushing.disable()
+    assert pushing.force_left == "serial-rig: a calibration that was called off has not ended within 1 s"
+    pushing.disable()
+    assert pushing.force_left == ""
