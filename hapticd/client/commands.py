@@ -142,9 +142,13 @@ class _Talk:
         """The answer to a request.
 
         Raises:
+            RefusedError: a text of it is no UTF-8.
             SilenceError: none came, or for a verdict on a configuration not even a sign of life.
         """
-        self._socket.send(msgpack.packb(request))
+        try:
+            self._socket.send(msgpack.packb(request))
+        except UnicodeEncodeError:
+            raise RefusedError(f"{request['do']}: a text that is no UTF-8 cannot be sent") from None
         patient = request["do"] == "reload"
         silent = False
         while True:

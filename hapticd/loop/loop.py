@@ -9,7 +9,7 @@ from typing import Any
 from hapticd.config.models import LoopConfig
 from hapticd.config.safety import SafetyConfig
 from hapticd.driver import Driver, DriverState
-from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError
+from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError, in_words
 from hapticd.loop.memory import (
     ANSWERED,
     DISARM,
@@ -119,7 +119,7 @@ class ControlLoop:
         except HapticdError:
             raise
         except Exception as error:
-            raise _nonsense(error) from error
+            raise _nonsense(error, session.driver) from error
         rate_hz = self._loop.rate_hz
         session.event(EventCode.STARTED, f"the loop runs at {rate_hz:g} Hz", rate_hz=rate_hz)
         if self._auto_arm:
@@ -190,7 +190,7 @@ class ControlLoop:
             except HapticdError:
                 raise
             except Exception as error:  # a law's are caught in the tick, so this is the driver's
-                raise _nonsense(error) from error
+                raise _nonsense(error, session.driver) from error
 
             if words[DISARM] != words[DISARMED]:
                 session.disarm()
@@ -279,6 +279,6 @@ class ControlLoop:
         self.session.leave()
 
 
-def _nonsense(error: Exception) -> DriverError:
+def _nonsense(error: Exception, driver: Driver[Any]) -> DriverError:
     """What a driver raised that is no error of a driver, or what came of a sample that is none."""
-    return DeviceProtocolError(f"its driver failed: {type(error).__name__}: {error}")
+    return DeviceProtocolError(f"its driver failed: {in_words(error, type(driver).__module__)}")

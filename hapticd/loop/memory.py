@@ -59,6 +59,12 @@ DISARMED_SINCE = "not done: disarming was asked for after it"
 GO = b"go"
 """The packet that lets the loop's process open the device."""
 
+DEVICE_LOST = 3
+"""Exit code of the loop's process: the device is gone, and may come back."""
+
+FORCE_LEFT = 4
+"""Exit code of the loop's process: it ended, and the driver could not take the force away."""
+
 LARGEST_ANSWER = 1 << 16
 """Of the packet with which the loop's process says that it is ready, or why it is not [bytes]."""
 
@@ -144,11 +150,14 @@ class SharedMemory:
         """Send a request to the loop (supervisor side).
 
         Raises:
-            HapticdError: the one before is not answered yet, or it is too long.
+            HapticdError: the one before is not answered yet, it is too long, or it holds what no message can.
         """
         if self.words[ANSWERED] != self.words[REQUESTS]:
             raise HapticdError("the control loop is still busy with the request before")
-        packed: bytes = msgpack.packb(request | {"disarm": self.words[DISARM]})
+        try:
+            packed: bytes = msgpack.packb(request | {"disarm": self.words[DISARM]})
+        except (ValueError, TypeError, OverflowError) as error:  # parameters are as a law of anybody's makes them
+            raise HapticdError(f"the loop cannot be told: {type(error).__name__}: {error}") from error
         if len(packed) > _REQUEST_SIZE:
             raise HapticdError(f"the request is {len(packed)} bytes long, {_REQUEST_SIZE} fit")
         self.view[_REQUEST : _REQUEST + len(packed)] = packed

@@ -26,16 +26,13 @@ from hapticd.config.walls import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import GO, SUPERVISOR_BEAT, SharedMemory
+from hapticd.loop.memory import DEVICE_LOST, FORCE_LEFT, GO, SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
 from hapticd.loop.resume import ResumeState, identity
 from hapticd.loop.warm_up import warm_up
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.record import RecordLayout
 from hapticd.version import __version__
-
-DEVICE_LOST = 3
-"""Exit code: the device is gone, and may come back."""
 
 _LONGEST_ERROR = 1 << 14
 
@@ -60,21 +57,27 @@ def main() -> int:
             return 1  # the supervisor is gone
         control = _prepare(asked, channel, arguments.parent)
     except HapticdError as error:
+        if _debugs():
+            traceback.print_exception(error)
         with contextlib.suppress(ConnectionError):
             refusal = {"error": str(error)[:_LONGEST_ERROR], "exit_code": error.exit_code}
             channel.send(msgpack.packb(refusal, unicode_errors="surrogateescape"))
         return error.exit_code
     except ConnectionError:
         return 1  # the supervisor is gone
+    ended = 0
     try:
         control.run()
     except DriverError as error:  # the event says why
-        if error.__cause__ is not None:
-            traceback.print_exception(error.__cause__)
-        return DEVICE_LOST
+        if _debugs():
+            traceback.print_exception(error)
+        ended = DEVICE_LOST
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd and the supervisor both send one; it is over
-    return 0
+    force_left = control.session.driver.force_left
+    if force_left:
+        sys.stderr.write(f"the driver could not take the force away: {force_left}\n")
+    return FORCE_LEFT if force_left else ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +88,10 @@ class _Asked:
     accuracy: str
     resume: ResumeState
     laws: dict[str, ModuleType]
+
+
+def _debugs() -> bool:
+    return os.environ.get("HAPTICD_DEBUG") == "1"
 
 
 def _asked() -> _Asked:
@@ -101,7 +108,7 @@ def _asked() -> _Asked:
 def _prepare(asked: _Asked, channel: socket.socket, parent_pid: int) -> ControlLoop:
     config, resume = asked.config, asked.resume
     settings = config.config
-    driver = config.driver(config.options, settings.loop.period_s)
+    driver = config.make_driver()
     place_device(config, driver)
     info = driver.open()
     try:

@@ -82,7 +82,8 @@ class RequestHandler:
 
     def _do_arm(self) -> Generator[None, None, None]:
         if not self._session.arm():
-            raise HapticdError("stopped by a fault: `hapticd clear` first")
+            ends = self._session.stop_requested
+            raise HapticdError("the daemon is ending" if ends else "stopped by a fault: `hapticd clear` first")
         yield
 
     def _do_clear(self) -> Generator[None, None, None]:
@@ -102,7 +103,7 @@ class RequestHandler:
         yield from self._until_released()
         if self._withdrawn:  # while it waited
             raise HapticdError(DISARMED_SINCE)
-        if session.tick.guard.mode is not Mode.DISARMED or session.driver.state is not DriverState.OPEN:
+        if session.driver.state is not DriverState.OPEN:
             raise HapticdError("calibration moves the arm by itself: `hapticd disarm` first")
         session.event(EventCode.CALIBRATING, "calibrating: the arm moves by itself")
         ended: list[Exception | None] = []

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -20,6 +21,8 @@ from hapticd.config.walls import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.loop.memory import (
+    DEVICE_LOST,
+    FORCE_LEFT,
     GO,
     LARGEST_ANSWER,
     RECORDS,
@@ -41,6 +44,8 @@ KILL_TIMEOUT_S = 1.0
 STALL_S = 0.1
 """How long the loop may stand still before it is given up [s]; at least ten periods."""
 
+_CLUNG = "the control loop could not take the force away"
+
 
 class LoopProcess:
     """A running loop.
@@ -60,6 +65,7 @@ class LoopProcess:
         shared: the memory shared with it.
         reader: its tick records.
         events: its events.
+        force_seen_to: that no force of it is left on the device has been looked after.
     """
 
     def __init__(
@@ -80,6 +86,7 @@ class LoopProcess:
         self.reader = RecordReader(self.shared)
         self.events = EventReader(self.shared)
         self.stall_s = max(STALL_S, 10.0 * config.config.loop.period_s)
+        self.force_seen_to = False
         self._dropped = (0, 0)
         self._still_s = 0.0
         self._written = 0
@@ -89,6 +96,16 @@ class LoopProcess:
     def exit_code(self) -> int | None:
         """How the process ended; None while it runs."""
         return self.process.poll()
+
+    @property
+    def left_behind(self) -> str:
+        """Why a process that has ended may have left a force on its device, a line for people; "" if it did not."""
+        code = self.process.returncode
+        if code in (0, DEVICE_LOST):
+            return ""
+        if code == FORCE_LEFT:
+            return _CLUNG
+        return f"the loop's process {f'was killed by signal {-code}' if code < 0 else f'ended with exit code {code}'}"
 
     @property
     def skipped(self) -> int:
@@ -126,9 +143,13 @@ class LoopProcess:
         with contextlib.suppress(ProcessLookupError):
             self.process.terminate()
 
-    def end(self) -> bool:
-        """Let the loop ramp its force out and end; kill it when it does not, and return False."""
-        return end(self.process)
+    def end(self) -> str:
+        """Let the loop ramp its force out and end; kill it when it does not.
+
+        Returns:
+            Why the force has to be taken away from outside, a line for people; "" when it is gone.
+        """
+        return end(self.process) or self.left_behind
 
     def kill(self) -> None:
         """End the process at once, whatever it is doing."""
@@ -139,16 +160,20 @@ class LoopProcess:
         self.shared.close()
 
 
-def end(process: subprocess.Popen[bytes]) -> bool:
-    """Let a loop ramp its force out and end; kill it when it does not, and return False."""
+def end(process: subprocess.Popen[bytes]) -> str:
+    """Let a loop ramp its force out and end; kill it when it does not.
+
+    Returns:
+        Why the force has to be taken away from outside, a line for people; "" when it is gone.
+    """
     with contextlib.suppress(ProcessLookupError):
         process.terminate()
     try:
         process.wait(END_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         kill(process)
-        return False
-    return True
+        return "the control loop did not end and was killed"
+    return _CLUNG if process.returncode == FORCE_LEFT else ""
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
@@ -169,12 +194,22 @@ class LoopStart:
 
     Args:
         config: what it is to run.
+        rescue: called with why the force has to be taken away from outside, where this did not end by itself without.
         resume: where the loop before stopped, when this one goes on for it.
         wait: it gets ready, and does not touch the device before `go`.
     """
 
-    def __init__(self, config: LoadedConfig, resume: ResumeState = FROM_START, *, wait: bool = False) -> None:
+    def __init__(
+        self,
+        config: LoadedConfig,
+        rescue: Callable[[str], None],
+        resume: ResumeState = FROM_START,
+        *,
+        wait: bool = False,
+    ) -> None:
         self._config = config
+        self._rescue = rescue
+        self._ended = False
         self._give_up_s = time.monotonic() + TIMEOUT_S
         wanted = {"version": version.__version__, "text": config.text, "name": str(config.path)}
         request = msgpack.packb(wanted | {"resume": asdict(resume)}, unicode_errors="surrogateescape")
@@ -227,6 +262,8 @@ class LoopStart:
             if not answer:
                 raise HapticdError("the loop died while it started; its last words are above")
             refusal = msgpack.unpackb(answer, unicode_errors="surrogateescape")
+            if "error" not in refusal:  # it is ready, and the kernel had no room for its descriptor
+                raise HapticdError("no file descriptor is left for the loop's memory: raise `ulimit -n` or LimitNOFILE")
             if refusal["exit_code"] == ConfigError.exit_code:
                 raise ConfigError(*refusal["error"].split("\n"))
             raise HapticdError(refusal["error"])
@@ -251,4 +288,7 @@ class LoopStart:
     def end(self) -> None:
         """Give up: the process ends, without force."""
         self._channel.close()
-        end(self._process)
+        why = "" if self._ended else end(self._process)
+        self._ended = True
+        if why:
+            self._rescue(why)

@@ -50,10 +50,10 @@ class CommandHandler:
                 case "arm" | "calibrate" | "tare" | "clear" as do:
                     state.requests.submit({"do": do}, _answering(reply), _deadline_ns(request))
                 case "reload" if request.get("wait"):
-                    state.reload_asked.append(_answering(reply))
+                    state.ask_reload(_answering(reply))
                 case "reload":
                     reply(True)
-                    state.reload_asked.append(_unanswered)
+                    state.ask_reload()
                 case "stop":
                     state.stop_reason = state.stop_reason or "asked over the control socket"
                     reply(True)
@@ -97,6 +97,7 @@ class CommandHandler:
                 reply(False, f"there is no device to {do}: {recovery.why}")
             case _:
                 recovery.amend(replace(recovery.resume, latched=False))
+                recovery.hurry()
                 state.tell(EventCode.CLEARED, "fault cleared")
                 reply(True)
 

@@ -18,8 +18,10 @@ from hapticd.errors import InstanceError
 from hapticd.keys.connections import ConnectionBound, descriptor_of, local_peer
 from hapticd.keys.frames import FrameReader
 from hapticd.keys.heartbeat import expect_signs_of_life
+from hapticd.keys.local_bind import bind_local
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
+from hapticd.paths import why_refused
 
 _LARGEST_REQUEST = 1 << 13  # bytes of a frame
 _MOST_UNREAD = 100  # requests of a client
@@ -74,11 +76,10 @@ class CommandSocket:
         self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
         self._socket.setsockopt(zmq.RCVHWM, _MOST_UNREAD)
         try:
-            self._socket.bind(f"ipc://{path}")
-            path.chmod(0o660)
+            bind_local(self._socket, path)
         except (zmq.ZMQError, OSError) as error:
             self.close()
-            raise InstanceError(f"ipc://{path}: {error.strerror}; run as the user that owns the directory") from error
+            raise InstanceError(f"ipc://{path}: {why_refused(error.errno)}") from error
         if tcp is not None:
             self._bind_tcp(tcp, ring)
 

@@ -74,7 +74,8 @@ class Daemon:
         self._instance = instance
         self._terminal = Terminal()
         self._offset_ns = offset_ns = measure_epoch_offset_ns()
-        ring = key_ring(config)
+        self._notifier = Notifier()
+        ring, faults = key_ring(config), fault_directory(instance)
         self._few_descriptors = raise_descriptor_limit()
         with contextlib.ExitStack() as undo:
             self.lock = InstanceLock(instance)
@@ -84,7 +85,7 @@ class Daemon:
             remote = RemoteProcess(self.lock.directory)
             undo.callback(remote.close)
             remote.prepare(config)
-            start = LoopStart(config, wait=True)  # both import what they need at the same time
+            start = LoopStart(config, self._rescue, wait=True)  # both import what they need at the same time
             with contextlib.ExitStack() as on_the_way:
                 on_the_way.callback(start.end)
                 self.release.wait_ready()  # before there can be a force to take away; if it is not, that is said later
@@ -100,12 +101,12 @@ class Daemon:
             remote.serve(config, loop, ring, offset_ns)
             remote.wait_ready()
             status = StatusBuilder(instance, offset_ns, config.path.absolute())
-            event_log = EventLog(instance, publisher, status, fault_directory(instance), offset_ns)
+            event_log = EventLog(instance, publisher, status, faults, offset_ns)
             self.state = DaemonState(
                 config=config,
                 loop=loop,
                 requests=RequestQueue(loop.shared),
-                recovery=Recovery(),
+                recovery=Recovery(self._rescue),
                 publisher=publisher,
                 commands=commands,
                 remote=remote,
@@ -113,7 +114,7 @@ class Daemon:
                 epoch_offset_ns=offset_ns,
                 status=status,
                 event_log=event_log,
-                notifier=Notifier(),
+                notifier=self._notifier,
             )
             starting.pop_all()
             undo.callback(lambda: self._end(self.state.loop))  # by then it may be another one
@@ -124,7 +125,6 @@ class Daemon:
         self._device_lost: LoopEvent | None = None
         self._problem = ""
         self._stopping = False
-        self._ready = False
         self._sleep = SleepWatch()
         self._stop_by_s = 0.0
 
@@ -154,9 +154,20 @@ class Daemon:
 
     def _end(self, loop: LoopProcess) -> None:
         """See that no force is left, whatever the daemon ends for."""
-        if not loop.end() and self.exit_code != 1:  # else it has been seen to
-            log.error("the control loop did not end and was killed; %s", self.release.release())
+        why = loop.end()
+        if why and not loop.force_seen_to:
+            log.error("%s; %s", why, self._take_force_away())
         loop.close()
+
+    def _rescue(self, why: str) -> None:
+        """Take the force away from outside, and be ready to do so again: the daemon may go on."""
+        log.error("%s; %s", why, self._take_force_away())
+        with contextlib.suppress(OSError):  # no process can be started: the status warns of that
+            self.release.renew()
+
+    def _take_force_away(self) -> str:
+        """What came of it, a line for people; helper and driver may hang for seconds, and the daemon does not."""
+        return self._notifier.feed_during(self.release.release)
 
     async def _serve(self) -> int:
         state = self.state
@@ -292,18 +303,17 @@ class Daemon:
         if self._terminal.closed():
             self.stop("the terminal was closed")
         else:
-            self.state.reload_asked.append(lambda _verdict: None)
+            self.state.ask_reload()
 
     def _loop_ended(self) -> None:
         state = self.state
         state.event_log.recorder.loop_ended()
-        code = state.loop.exit_code
-        if self._stopping and (code == 0 or self._device_lost is not None):
+        left = state.loop.left_behind
+        if self._stopping and not left:
             log.info("stopped")
             self.exit_code = 0
         else:
-            how = f"was killed by signal {-code}" if code and code < 0 else f"ended with exit code {code}"
-            self._loop_lost(f"the loop's process {how}")
+            self._loop_lost(left or f"the loop's process ended with exit code {state.loop.exit_code}")
 
     def _begin_recovery(self, event: LoopEvent) -> None:
         """The loop has told that its device is gone; it is just ending."""
@@ -319,7 +329,8 @@ class Daemon:
         """The loop no longer looks after the device: take the force away from outside, and end."""
         state = self.state
         state.loop.kill()
-        outcome = self.release.release()
+        state.loop.force_seen_to = True
+        outcome = self._take_force_away()
         state.tell(EventCode.CONTROL_LOST, f"{text}; {outcome}")
         self.exit_code = 1
 
@@ -337,7 +348,6 @@ class Daemon:
         )
         state.publisher.status(status.as_map())
         doing = f"no device: {state.recovery.why}" if state.recovery.lost else f"{state.status.rate_hz:.0f} Hz"
-        # Ready once the status tells of ticks: who comes after that finds none of before them.
-        ready = () if self._ready or state.status.last is None else ("READY=1",)
-        self._ready = self._ready or bool(ready)
+        ready = ("READY=1",) if state.ready_due and state.status.last is not None else ()
+        state.ready_due = state.ready_due and not ready
         state.notifier.send(*ready, f"STATUS={doing}, law {status.law}")

@@ -65,7 +65,8 @@ class EventLog:
             config: what is in force.
             loop: to which loop; the ring of a fault's ticks is its.
         """
-        level = logging.ERROR if event.is_fault else logging.WARNING if event.code >= 300 else logging.INFO
+        warns = event.code >= 300 or event.code == EventCode.REFUSED
+        level = logging.ERROR if event.is_fault else logging.WARNING if warns else logging.INFO
         fields = {"instance": self._instance, "code": int(event.code), "tick": event.seq}
         log.log(level, "%s", event.text, extra=fields | {"law": config.config.controller.law})
         self._publisher.event(event)

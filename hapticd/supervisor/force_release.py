@@ -16,9 +16,12 @@ import select
 import signal
 import subprocess
 import sys
+import threading
+import time
+from typing import Any
 
 from hapticd.config.loading import LoadedConfig, parse
-from hapticd.errors import HapticdError
+from hapticd.driver import Driver
 from hapticd.loop.realtime import become_realtime
 
 READY_TIMEOUT_S = 10.0
@@ -32,6 +35,11 @@ _NO_HELPER = (
     "ended; restart hapticd"
 )
 
+_NO_ANSWER = f"the device did not answer within {TIMEOUT_S:g} s; its own watchdog has to release it"
+_NOT_OPENED = "the device could not be opened: "
+_NOT_LET_GO = "the device did not let go: "
+_RELEASED = "the device is without force"
+
 
 class ForceRelease:
     """A helper that is ready.
@@ -42,13 +50,14 @@ class ForceRelease:
 
     def __init__(self, config: LoadedConfig) -> None:
         self._config = config
-        self._helper = _start(config)
-        self._ready = False
+        self._helper, self._ready = _start(config), False
+        self._ready_by_s = time.monotonic() + READY_TIMEOUT_S
 
     @property
     def problem(self) -> str:
-        """Why the force would not be taken away at once, a line for people; "" while the helper is ready."""
-        return "" if self._helper.poll() is None and self.wait_ready(0.0) else _NO_HELPER
+        """Why the force would not be taken away at once, a line for people; "" while the helper is ready, or nearly."""
+        starting = time.monotonic() < self._ready_by_s
+        return "" if self._helper.poll() is None and (self.wait_ready(0.0) or starting) else _NO_HELPER
 
     def wait_ready(self, timeout_s: float = READY_TIMEOUT_S) -> bool:
         """Return when the helper is ready, or False when it does not get there.
@@ -65,25 +74,58 @@ class ForceRelease:
         return self._ready
 
     def release(self) -> str:
-        """Open the device in the helper and disable it.
+        """Open the device in the helper and disable it; where that cannot be, in this process. Never raises.
 
         Returns:
             What came of it, a line for people.
         """
-        if self._helper.poll() is not None:  # somebody has killed it
-            self.close()
-            self._helper, self._ready = _start(self._config), False
-        with contextlib.suppress(ProcessLookupError):
-            self._helper.send_signal(signal.SIGCONT)  # somebody may have stopped it
-        if not self.wait_ready():
-            return "the helper that takes the force away did not start; the device's own watchdog has to release it"
+        why = "it was not ready in time"
+        try:
+            if self._helper.poll() is not None:  # somebody has killed it
+                self.renew()
+            with contextlib.suppress(ProcessLookupError):
+                self._helper.send_signal(signal.SIGCONT)  # somebody may have stopped it
+            if self.wait_ready():
+                said = self._by_helper()
+                return f"{said}; without the helper, {self._here()}" if said.startswith(_NOT_LET_GO) else said
+        except Exception as error:  # noqa: BLE001 - whatever keeps a process from being started, a hand holds the device
+            why = str(error)
+        return f"the helper that takes the force away did not start ({why}); without it, {self._here()}"
+
+    def _by_helper(self) -> str:
         try:
             _, said = self._helper.communicate(b"!", TIMEOUT_S)
         except subprocess.TimeoutExpired:
-            return f"the device did not answer within {TIMEOUT_S:g} s; its own watchdog has to release it"
-        if self._helper.returncode:
-            return f"the device could not be opened: {said.decode(errors='replace').strip()}"
-        return "the device is without force"
+            return _NO_ANSWER
+        return said.decode(errors="replace").strip() if self._helper.returncode else _RELEASED
+
+    def _here(self) -> str:
+        """Where a driver that hangs hangs a thread of the daemon, which ends anyway."""
+        said = [_NO_ANSWER]
+
+        def let_go() -> None:
+            try:
+                said[0] = _let_go(self._config.make_driver()) or _RELEASED
+            except Exception as error:  # noqa: BLE001 - a driver is anybody's code
+                said[0] = f"{_NOT_OPENED}{error}"
+
+        thread = threading.Thread(target=let_go, daemon=True)
+        try:
+            thread.start()
+            thread.join(TIMEOUT_S)
+        except RuntimeError:  # no more threads either
+            let_go()
+        return said[0]
+
+    def renew(self) -> None:
+        """Have another helper in the place of one that has done its work or has ended; it is not ready yet.
+
+        Raises:
+            OSError: no process can be started.
+        """
+        self.close()
+        self._helper, self._ready = _start(self._config), False
+        self._ready_by_s = time.monotonic() + READY_TIMEOUT_S
 
     def close(self) -> None:
         """The helper is not needed any more."""
@@ -107,6 +149,13 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
         )
 
 
+def _let_go(driver: Driver[Any]) -> str:
+    """Open the device and take the force away; "" when it is gone, else what was in the way, a line for people."""
+    driver.open()
+    driver.close()
+    return f"{_NOT_LET_GO}{driver.force_left}" if driver.force_left else ""
+
+
 def main() -> int:
     """Be ready; then open, disable, close."""
     # systemd tells all at once; the supervisor's end is the end of this.
@@ -119,18 +168,17 @@ def main() -> int:
         with os.fdopen(arguments.config, "rb") as file:
             config = parse(file.read().decode(), "configuration")
         loop = config.config.loop
-        driver = config.driver(config.options, loop.period_s)
+        driver = config.make_driver()
         become_realtime(loop.model_copy(update={"realtime": "off" if loop.realtime == "off" else "preferred"}))
         os.write(sys.stdout.fileno(), b"r")
         if not sys.stdin.buffer.read(1):
             return 0
-        driver.open()
-        driver.close()
-    except HapticdError as error:
-        with contextlib.suppress(OSError):
-            sys.stderr.write(f"{error}\n")
-        return error.exit_code
-    return 0
+        problem = _let_go(driver)
+    except Exception as error:  # noqa: BLE001 - a driver is anybody's code; its exception becomes one line
+        problem = f"{_NOT_OPENED}{error}"
+    with contextlib.suppress(OSError):
+        sys.stderr.write(problem)
+    return 1 if problem else 0
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from hapticd.errors import InstanceError
-from hapticd.paths import LOCK, make_runtime_directory
+from hapticd.paths import LOCK, make_runtime_directory, open_lock, why_refused
 
 LOOK_S = 0.2
 """How long a client that looks whether a daemon lives may hold the lock, which takes it microseconds [s]."""
@@ -32,10 +32,7 @@ class InstanceLock:
     def __init__(self, instance: str) -> None:
         self.directory: Path = make_runtime_directory(instance)
         path = self.directory / LOCK
-        try:
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        except OSError as error:
-            raise InstanceError(f"{path}: {error.strerror}; run as the user that owns the directory") from error
+        self._descriptor = open_lock(path)
         try:
             _take(self._descriptor)
         except OSError as error:
@@ -48,9 +45,13 @@ class InstanceLock:
         if not path.exists() or path.stat().st_ino != os.fstat(self._descriptor).st_ino:
             os.close(self._descriptor)
             raise InstanceError(f"instance {instance!r} is just being stopped or started by another daemon; try again")
-        os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, f"{os.getpid()}\n".encode(), 0)
         self._path = path
+        try:
+            os.ftruncate(self._descriptor, 0)
+            os.pwrite(self._descriptor, f"{os.getpid()}\n".encode(), 0)
+        except OSError as error:  # a disk that is full
+            self.close()
+            raise InstanceError(f"{path}: {why_refused(error.errno)}") from error
 
     def close(self) -> None:
         """Give the instance back and leave nothing behind."""

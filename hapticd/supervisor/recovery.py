@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from hapticd.config.loading import LoadedConfig
@@ -25,6 +26,10 @@ STEADY_S = 60.0
 class Recovery:
     """Starts loops until one has the device again.
 
+    Args:
+        rescue: called with why the force has to be taken away from outside, where a try did not end by itself, or the
+            loop that lost the device did not let go of it.
+
     Attributes:
         lost: the device is being looked for.
         lost_s: since when, on CLOCK_MONOTONIC [s].
@@ -33,7 +38,8 @@ class Recovery:
         resume: what the next loop goes on from.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rescue: Callable[[str], None]) -> None:
+        self._rescue = rescue
         self.lost = False
         self.lost_s = 0.0
         self.next_try_s = 0.0
@@ -67,9 +73,9 @@ class Recovery:
             lost: the process that lost it, which has to end first.
             config: what the next one is to run.
         """
+        if not lost.force_seen_to:
+            self._see_to_force(lost)
         if lost.exit_code is None:
-            if lost.stalled():  # in a driver that cannot let go of a device that is gone
-                lost.kill()
             return None
         now_s = time.monotonic()
         if self._arrivals.news():
@@ -78,7 +84,7 @@ class Recovery:
         try:
             if self._start is None:
                 if now_s >= self.next_try_s:
-                    self._start = LoopStart(config, self.resume)
+                    self._start = LoopStart(config, self._rescue, self.resume)
                 return None
             control = self._start.poll()
             if control is None:
@@ -101,11 +107,29 @@ class Recovery:
             self.resume = resume
             self.stop()
 
+    def hurry(self) -> None:
+        """Somebody has seen to what kept the device away: look at once, and as if for the first time."""
+        self._wait_s = FIRST_S
+        self.next_try_s = min(self.next_try_s, time.monotonic())
+
     def stop(self) -> None:
         """Give up a try that is under way; the next turn begins another."""
         if self._start is not None:
             self._start.end()
             self._start = None
+
+    def _see_to_force(self, lost: LoopProcess) -> None:
+        """Have the force of a lost device taken away from outside where its loop did not: it may only be silent."""
+        if lost.exit_code is not None:
+            why = lost.left_behind
+        elif lost.stalled():  # in a driver that cannot let go of a device that is gone
+            lost.kill()
+            why = "the control loop did not let go of its device and was killed"
+        else:
+            return
+        lost.force_seen_to = True
+        if why:
+            self._rescue(why)
 
     def _put_off(self, why: str) -> None:
         self.why = why

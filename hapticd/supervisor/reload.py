@@ -114,7 +114,7 @@ class Reload:
                 return
             state.adopt(wanted, ring)
             self._follow()
-            state.notifier.send("READY=1")
+            state.ready_due = True
             for answer in answers:
                 answer("")
 
@@ -125,6 +125,7 @@ class Reload:
             resume = state.recovery.resume
             other_law = not same_law(state.config, wanted)
             state.recovery.amend(replace(resume, law=resume.law + other_law))
+            state.recovery.hurry()
             text = f"configuration {wanted.hash}: in force when the device is back"
             state.tell(EventCode.SWITCHED, text)
             finish("")
@@ -135,7 +136,7 @@ class Reload:
         state = self._state
         text = f"configuration refused, nothing changed: {why}"
         state.tell(EventCode.REFUSED, text)
-        state.notifier.send("READY=1")
+        state.ready_due = True
         for answer in answers:
             answer(why)
 

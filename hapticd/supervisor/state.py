@@ -12,7 +12,7 @@ from hapticd.supervisor.commands import CommandSocket
 from hapticd.supervisor.events import EventLog
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.remote_process import RemoteProcess
-from hapticd.supervisor.request_queue import Answer, RequestQueue
+from hapticd.supervisor.request_queue import MOST_WAITING, Answer, RequestQueue
 from hapticd.supervisor.status import StatusBuilder
 from hapticd.supervisor.systemd import Notifier
 from hapticd.telemetry.publisher import Publisher
@@ -39,6 +39,8 @@ class DaemonState:
         reload_asked: answers to those who asked for a reload that has not begun.
         stop_reason: why the daemon is to end; "" as long as it is not.
         status_due_s: when the status is published next [s of CLOCK_MONOTONIC].
+        ready_due: systemd hears that the daemon is ready, once the status tells of ticks: who comes after that finds
+            none of before them, and after a reload none of the configuration before.
     """
 
     config: LoadedConfig
@@ -56,6 +58,7 @@ class DaemonState:
     reload_asked: list[Answer] = field(default_factory=list)
     stop_reason: str = ""
     status_due_s: float = 0.0
+    ready_due: bool = True
 
     def tell(self, code: EventCode, text: str, **fields: float | int | str) -> None:
         """Tell of an event that the supervisor itself has to report.
@@ -66,6 +69,19 @@ class DaemonState:
             fields: what programs may want to know of it.
         """
         self.event_log.tell_now(code, text, self.config, self.loop, **fields)
+
+    def ask_reload(self, answer: Answer | None = None) -> None:
+        """Have the file taken over, once for all who ask before that begins.
+
+        Args:
+            answer: called with the verdict; None: who asks does not wait for it.
+        """
+        if answer is None and not self.reload_asked:
+            self.reload_asked.append(lambda _verdict: None)
+        elif answer is not None and len(self.reload_asked) < MOST_WAITING:
+            self.reload_asked.append(answer)
+        elif answer is not None:
+            answer("too many are waiting for a verdict on the file; try again")
 
     def adopt(self, config: LoadedConfig, ring: KeyRing | None) -> None:
         """Go on with another configuration and other keys; the loop has its part already."""

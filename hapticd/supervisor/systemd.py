@@ -7,7 +7,9 @@ import logging
 import os
 import socket
 import sys
+import threading
 import time
+from collections.abc import Callable
 
 _ROUND_S = 0.01
 """How often it is fed at most [s]."""
@@ -35,12 +37,33 @@ class Notifier:
             self._fed_s = now_s
             self.send("WATCHDOG=1")
 
+    def feed_during(self, work: Callable[[], str]) -> str:
+        """Do what has an end by itself and may take a while, in a thread, and tell systemd until then that all is well.
+
+        Args:
+            work: raises nothing.
+
+        Returns:
+            What it returned.
+        """
+        said: list[str] = []
+        thread = threading.Thread(target=lambda: said.append(work()), daemon=True)
+        try:
+            thread.start()
+        except RuntimeError:  # there are no more threads
+            return work()
+        while thread.is_alive():
+            self.feed_watchdog()
+            thread.join(2.0 * _ROUND_S)
+        return said[0]
+
     def send(self, *lines: str) -> None:
-        """Send assignments such as READY=1."""
+        """Send assignments such as READY=1; of several lines one is made, since a line is an assignment."""
         if self._socket is not None:
+            said = "\n".join("; ".join(map(str.strip, line.splitlines())) for line in lines)
             # systemd being away or slow to read is no reason to stop or to wait.
             with contextlib.suppress(OSError):
-                self._socket.sendto("\n".join(lines).encode(), socket.MSG_DONTWAIT, self._address)
+                self._socket.sendto(said.encode(errors="replace"), socket.MSG_DONTWAIT, self._address)
 
 
 SOCKET = "/run/systemd/journal/socket"

@@ -19,6 +19,7 @@ from hapticd.config.models import TelemetryConfig
 from hapticd.errors import InstanceError
 from hapticd.keys.connections import ConnectionBound, descriptor_of
 from hapticd.keys.heartbeat import expect_signs_of_life
+from hapticd.keys.local_bind import bind_local
 from hapticd.keys.policy import stays_here
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
@@ -31,6 +32,7 @@ from hapticd.tick.record import TickRecord
 BATCH_NS = 20_000_000
 """Longest time that a tick waits in a batch [ns]."""
 
+_TOPICS_PER_TICK = 6
 _MOST_SUBSCRIPTIONS_AT_ONCE = 1000
 _LAST_WORDS_MS = 100
 _LARGEST_REQUEST = 128  # bytes of a subscription; ZeroMQ keeps forty times that for each
@@ -109,6 +111,7 @@ class Publisher:
         self._timing: list[Map] = []
         self._input: list[Map] = []
         self._batch_due_ns: int | None = None
+        self._high_water = config.send_high_water
         self.reconfigure(config)
 
         self._ipc_path: Path | None = None
@@ -142,7 +145,7 @@ class Publisher:
         What waits is sent first: a status tells the step of `seq` of all that comes after it.
         """
         self._send_batch()
-        self._batch_ticks = config.batch_ticks
+        self._batch_ticks = self._most_ticks = config.batch_ticks
         self._every_ticks = config.every_ticks
         self._input_every_tick = config.input_every_tick
 
@@ -161,7 +164,13 @@ class Publisher:
             self._gate.renew(ring.pair, ring.watchers())
 
     def publish(self, records: Sequence[TickRecord]) -> None:
-        """Publish ticks, oldest first. Full batches leave now, the rest with `flush`; cycles leave now."""
+        """Publish ticks, oldest first. Full batches leave now, the rest with `flush`; cycles leave now.
+
+        What would fill half of a subscriber's queue at once leaves now in messages of 20 ms, whatever a batch is: it
+        is the daemon that was late, and no subscriber is to lose a tick by it.
+        """
+        flood = 2 * _TOPICS_PER_TICK * len(records) > self._high_water * self._batch_ticks
+        self._most_ticks = len(records) if flood else self._batch_ticks
         cycles: list[Map] = []
         for record in records:
             timestamp = timestamp_s(record.deadline_ns, self._offset_ns)
@@ -173,6 +182,8 @@ class Publisher:
                 self._add_input(record, timestamp)
             if record.seq % self._every_ticks == 0:
                 self._add_tick(record, timestamp, contacts)
+        if flood:
+            self._send_batch()
         if cycles:
             self.counts.cycles += len(cycles)
             self._send(Topic.CYCLE, cycles)
@@ -245,7 +256,7 @@ class Publisher:
         self._contact += wire.contact_maps(record, timestamp)
         self._timing.append(wire.timing_map(record, timestamp))
         self.counts.ticks += 1
-        if len(self._position) >= self._batch_ticks:
+        if len(self._position) >= self._most_ticks:
             self._send_batch()
 
     def _add_input(self, record: TickRecord, timestamp: float) -> None:
@@ -323,9 +334,13 @@ class Publisher:
     def _bind_ipc(self, path: Path) -> None:
         if path.exists() and not path.is_socket():
             raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
-        self._bind(f"ipc://{path}")
+        endpoint = f"ipc://{path}"
+        try:
+            bind_local(self._socket, path)
+        except zmq.ZMQError as error:
+            raise _refused(endpoint, error) from error
         self._ipc_path = path
-        path.chmod(0o660)
+        self.endpoints.append(endpoint)
 
     def _bind(self, endpoint: str) -> None:
         try:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 from hapticd.telemetry.wire import SCHEMA, Topic
 
@@ -429,6 +429,12 @@ class Status:
     fault_timestamp: float = 0.0
     faults: int = 0
     fault_records: int = 0
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any]) -> Self:
+        """The status in an answer; a daemon of another version says more, or less."""
+        known = {each.name for each in dataclasses.fields(cls)}
+        return cls(**{key: value for key, value in said.items() if key in known})
 
     def as_map(self) -> dict[str, Any]:
         """Keys and values, for `Publisher.status`."""

@@ -58,6 +58,8 @@ class Daemon:
         return self
 
     def __exit__(self, *_: object) -> None:
+        if not self.directory.exists():  # it was never ready
+            return
         for pid in (self.control_pid(), self.process.pid):
             with contextlib.suppress(ProcessLookupError):
                 if pid:
@@ -69,8 +71,12 @@ class Daemon:
         shutil.rmtree(self.directory, ignore_errors=True)
 
     def wait_ready(self) -> Daemon:
-        """Return when the daemon has said that it ticks."""
-        self.notified("READY=1")
+        """Return when the daemon has said that it ticks; where it does not, it ends."""
+        try:
+            self.notified("READY=1")
+        except BaseException:  # nothing else would end it: `with Daemon(...).wait_ready()` has not begun
+            self.__exit__()
+            raise
         return self
 
     def notified(self, line: str) -> None:

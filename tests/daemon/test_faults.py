@@ -22,6 +22,7 @@ from hapticd.faults.store import FaultStore
 from hapticd.tick.event import EventCode
 from tests.daemon.running import Subscriber, all_records, gone, wait_until
 from tests.daemon.test_deaths import nothing_left
+from tests.faults.faulty_device import SILENT
 from tests.faults.rig import ATTEMPTS, Felt, Report, Rig, anew_where_late, events_until
 
 LIMIT_N = 12.0
@@ -148,6 +149,27 @@ def test_a_lost_device_is_without_force_and_comes_back_disarmed(record_property:
             rig.goes_on("arm")
             record, summary = rig.recorded(EventCode.DEVICE_LOST)
             assert (record.ticks[-1].seq, summary.after_s) == (found["seq"], 0.0)
+
+
+@anew_where_late
+def test_a_lost_device_that_its_loop_cannot_let_go_of_is_let_go_of_from_outside(record_property: Report) -> None:
+    """It may only be silent. It kept its last force until its own watchdog, or for ever."""
+    with contextlib.ExitStack() as stack:
+        rigs = {order: stack.enter_context(Rig()) for order in SILENT}
+        subscribers = {order: stack.enter_context(rig.pressed().subscriber()) for order, rig in rigs.items()}
+        for order, rig in rigs.items():
+            rig.order(order)
+            events_until(subscribers[order], EventCode.DEVICE_LOST)
+        for order, rig in rigs.items():
+            felt = rig.released()
+            record_property(order, str(felt))
+            assert (felt.writes, felt.force_n) == (0, 0.0), order
+            rig.mend()
+        for order, rig in rigs.items():
+            events_until(subscribers[order], EventCode.DEVICE_FOUND)
+            rig.goes_on("arm")
+            said = rig.daemon.output()
+            assert ("; the device is without force" in said, "no helper" in said) == (True, False), order
 
 
 @anew_where_late

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -23,14 +25,23 @@ from hapticd.tick.record import RecordLayout, TickRecord
 from tests.daemon.running import Daemon, Subscriber
 from tests.daemon.test_deaths import PRESSED
 
-# What `hapticd run` finds on its path: once systemd has been told that it is ready, it gets no processor for a while.
+# What `hapticd run` finds on its path: once systemd has been told that it is ready, it gets no processor for a while,
+# and after a reload none until somebody has heard of it.
 HELD_UP = """
 import socket, time
+from pathlib import Path
+heard = Path(__file__).with_name("heard")
 class Slow(socket.socket):
+    reloads = 0
     def sendto(self, data, *rest):
         sent = super().sendto(data, *rest)
+        Slow.reloads += b"RELOADING=1" in data
         if b"READY=1" in data:
             time.sleep(0.5)
+            for _ in range(2000 * Slow.reloads):
+                if heard.exists():
+                    break
+                time.sleep(0.01)
         return sent
 socket.socket = Slow
 """
@@ -73,7 +84,7 @@ def made(status: StatusBuilder, loop: LoopProcess, recovery: Recovery) -> Status
 
 def test_a_device_is_calibrated_once_a_record_says_so_and_not_before(loop: LoopProcess) -> None:
     """T12: before the first record, a rig that did not know where it was was said to be calibrated."""
-    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery()
+    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock())
     assert not made(status, loop, recovery).calibrated
     status.add([record(Flag.UNCALIBRATED)])
     assert not made(status, loop, recovery).calibrated
@@ -84,7 +95,7 @@ def test_a_device_is_calibrated_once_a_record_says_so_and_not_before(loop: LoopP
 
 
 def test_a_device_that_is_lost_is_not_calibrated_until_the_next_loop_says_so(loop: LoopProcess) -> None:
-    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery()
+    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock())
     status.add([record(Flag.ARMED)])
     assert made(status, loop, recovery).armed
     recovery.lost, recovery.resume = True, replace(FROM_START, latched=True, law=3)
@@ -100,7 +111,7 @@ def test_the_rate_is_that_of_the_ticks_and_not_of_when_they_were_fetched(
     loop: LoopProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A supervisor that gets no processor fetches the ticks of 0.6 s late, and those of 0.9 s at once."""
-    status, recovery, now_s = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(), 100.0
+    status, recovery, now_s = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock()), 100.0
     monkeypatch.setattr("time.monotonic", lambda: now_s)
     rates = []
     for passed_s, ticks in ((0.6, range(600)), (0.6, range(600, 700)), (0.6, range(700, 1600)), (0.6, range(0))):
@@ -118,3 +129,18 @@ def test_who_comes_once_it_is_ready_finds_no_status_of_before_the_first_tick(tmp
             _, first = next(subscriber.maps())
     assert first["armed"]
     assert first["ticks"] > 0
+
+
+def test_sighup_reloads_as_well_and_the_status_tells_of_it_when_systemd_hears_that_all_is_ready(tmp_path: Path) -> None:
+    """Who came then found the law before in the status."""
+    (tmp_path / "sitecustomize.py").write_text(HELD_UP)
+    with Daemon(PRESSED, pythonpath=tmp_path).wait_ready() as daemon:
+        with Subscriber(daemon.endpoint, "hapticd/status") as subscriber:
+            next(subscriber.maps())
+            daemon.config.write_text(PRESSED + '[controller]\nlaw = "tdpa"\n')
+            daemon.process.send_signal(signal.SIGHUP)
+            daemon.notified("READY=1")
+            laws = (status["law"] for _, status in subscriber.maps(8.0))
+            told = next((law for law in laws if law == "tdpa"), "")
+        (tmp_path / "heard").touch()
+    assert told

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.supervisor.systemd import JournalHandler, datagram, log_handler
+from hapticd.supervisor.systemd import JournalHandler, Notifier, datagram, log_handler
 
 
 @pytest.fixture
@@ -114,3 +114,15 @@ def test_only_a_stream_to_the_journal_gets_fields(monkeypatch: pytest.MonkeyPatc
     assert not isinstance(log_handler(), JournalHandler)
     monkeypatch.delenv("JOURNAL_STREAM")
     assert not isinstance(log_handler(), JournalHandler)
+
+
+def test_what_systemd_is_told_is_one_assignment_a_line_whatever_the_text_is(
+    journal: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Why a device does not come back may be several lines, and a path in it no UTF-8, which ended the daemon."""
+    monkeypatch.setenv("NOTIFY_SOCKET", str(journal.getsockname()))
+    notifier = Notifier()
+    notifier.send("READY=1", "STATUS=no device: /lab\udce9/lab.toml: gone\n  MAINPID=1, law tdpa")
+    assert notifier._socket is not None
+    notifier._socket.close()
+    assert journal.recv(4096) == b"READY=1\nSTATUS=no device: /lab?/lab.toml: gone; MAINPID=1, law tdpa"

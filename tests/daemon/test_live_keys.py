@@ -81,6 +81,11 @@ LOOP: dict[str, tuple[str, Callable[[Bench], object], object]] = {
         lambda bench: bench.tick.ports[0].limits.driven,
         True,
     ),
+    "scene.couplings[].come_in_s": (
+        WALL + COUPLING + "come_in_s = 0.5\n",
+        lambda bench: bench.tick.ports[0].limits.come_in_s,
+        0.5,
+    ),
     "scene.couplings[].max_force_n": (
         WALL + COUPLING.replace("= 6.0", "= 4.0"),
         lambda bench: bench.tick.ports[0].limits.max_force_n,

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -65,8 +66,8 @@ def test_a_device_that_has_been_away_for_long_is_tried_when_something_is_plugged
 ) -> None:
     monkeypatch.setattr(recovery, "LoopStart", Absent)
     info = Loopback(SimulationOptions(), 1e-3).open()
-    lost: Any = SimpleNamespace(exit_code=0, shared=SimpleNamespace(words=[0] * 14), info=info)
-    looking = Recovery()
+    lost: Any = SimpleNamespace(exit_code=0, force_seen_to=True, shared=SimpleNamespace(words=[0] * 14), info=info)
+    looking = Recovery(Mock())
     nothing: Any = None
     looking.begin(lost, "unplugged")
     for _ in range(8):  # time after time in vain

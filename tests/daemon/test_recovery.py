@@ -5,19 +5,23 @@ from __future__ import annotations
 import errno
 import itertools
 import os
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
+from unittest.mock import Mock, call
 
 import pytest
 
 from hapticd.config.loading import parse
 from hapticd.errors import DeviceNotFoundError
-from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED
+from hapticd.loop.memory import DEVICE_LOST, DISARM, DISARMED, FORCE_LEFT, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED
 from hapticd.loop.resume import ResumeState
 from hapticd.simulation.options import SimulationOptions
 from hapticd.supervisor import recovery
+from hapticd.supervisor.child import LoopProcess
+from hapticd.supervisor.command_handler import CommandHandler
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.reload import Reload
 from hapticd_drivers.loopback import Loopback
@@ -27,7 +31,7 @@ from tests.daemon.running import wait_until
 class UnderWay:
     """A start that takes its time."""
 
-    def __init__(self, config: Any, resume: ResumeState) -> None:
+    def __init__(self, config: Any, _rescue: object, resume: ResumeState) -> None:
         self.config = config
         self.resume = resume
         self.ended = False
@@ -48,7 +52,7 @@ def looking(monkeypatch: pytest.MonkeyPatch) -> tuple[Recovery, list[UnderWay]]:
         return tries[-1]
 
     monkeypatch.setattr(recovery, "LoopStart", start)
-    made = Recovery()
+    made = Recovery(Mock())
     made.begin(LOST, "unplugged")
     try_now(made)
     return made, tries
@@ -56,7 +60,11 @@ def looking(monkeypatch: pytest.MonkeyPatch) -> tuple[Recovery, list[UnderWay]]:
 
 LEFT = {NEXT_SEQ: 70, SKIPPED: 2, LAW: 1, MAY_ARM: True, LATCHED: True, DISARM: 0, DISARMED: 0}
 LOST: Any = SimpleNamespace(
-    exit_code=0, shared=SimpleNamespace(words=LEFT), info=Loopback(SimulationOptions(), 1e-3).open()
+    exit_code=0,
+    left_behind="",
+    force_seen_to=False,
+    shared=SimpleNamespace(words=LEFT),
+    info=Loopback(SimulationOptions(), 1e-3).open(),
 )
 NO_CONFIG: Any = None
 
@@ -83,9 +91,42 @@ def test_clearing_again_and_again_keeps_no_device_away(looking: tuple[Recovery, 
     try_now(made)
     for _ in range(5):
         made.amend(replace(made.resume, latched=False))
+        made.hurry()
         try_now(made)
     assert len(tries) == 2
     assert not tries[1].ended
+
+
+@pytest.mark.parametrize("do", ["clear", "reload"])
+def test_a_clear_and_a_file_that_is_taken_have_the_device_looked_for_at_once(
+    lost: Lost, tmp_path: Path, do: str
+) -> None:
+    """What kept it away may be mended now, also where the file says what it said, as of a driver's own module."""
+    file = tmp_path / "lab.toml"
+    file.touch()
+    lost.waits_s(8)
+    answered: list[bool] = []
+    state: Any = SimpleNamespace(
+        config=parse("", str(file)),
+        recovery=lost.made,
+        reload_asked=[lambda verdict: answered.append(not verdict)] if do == "reload" else [],
+        commands=SimpleNamespace(receive=lambda: [({"do": do}, answered.append, "a test")]),
+        notifier=Mock(),
+        tell=Mock(),
+        adopt=Mock(),
+    )
+    if do == "clear":
+        CommandHandler(state).turn()
+    else:
+        taking = Reload(state)
+
+        def verdict() -> bool:
+            taking.turn()
+            return bool(answered)
+
+        wait_until(verdict, "a verdict")
+    assert answered == [True]
+    assert lost.waits_s(2) == pytest.approx([0.0, 1.0], abs=0.02)
 
 
 @pytest.mark.parametrize(("text", "tries_wanted"), [("[safety]\nmax_force_n = 2.0\n", 2), ("# a remark\n", 1)])
@@ -128,7 +169,8 @@ class Lost:
         monkeypatch.setattr(recovery, "time", SimpleNamespace(monotonic=lambda: self.now_s))
         monkeypatch.setattr(recovery, "HotplugWatch", lambda: SimpleNamespace(news=self._news))
         monkeypatch.setattr(recovery, "LoopStart", self._refuse)
-        self.made = Recovery()
+        self.rescue = Mock()
+        self.made = Recovery(self.rescue)
         self.tries_s: list[float] = []
 
     def _news(self) -> bool:
@@ -194,13 +236,46 @@ def test_soon_after_the_computer_came_up_the_first_wait_is_as_short(monkeypatch:
 
 @pytest.mark.parametrize("stalled", [False, True])
 def test_nothing_is_tried_before_the_process_that_lost_it_has_ended(lost: Lost, stalled: bool) -> None:
-    """One that hangs in its driver is killed."""
+    """One that hangs in its driver is killed, once, and the force taken away from outside: its device may be there."""
     killed: list[bool] = []
-    ending: Any = SimpleNamespace(exit_code=None, stalled=lambda: stalled, kill=lambda: killed.append(True))
+    ending: Any = SimpleNamespace(
+        exit_code=None, force_seen_to=False, stalled=lambda: stalled, kill=lambda: killed.append(True)
+    )
     lost.now_s += 100.0
-    assert lost.made.turn(ending, NO_CONFIG) is None
+    for _ in range(3):  # one that waits inside the kernel stays
+        assert lost.made.turn(ending, NO_CONFIG) is None
     assert lost.tries_s == []
     assert killed == [True] * stalled
+    said = "the control loop did not let go of its device and was killed"
+    assert lost.rescue.mock_calls == [call(said)] * stalled
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        (DEVICE_LOST, ""),
+        (FORCE_LEFT, "the control loop could not take the force away"),
+        (-11, "the loop's process was killed by signal 11"),
+        (1, "the loop's process ended with exit code 1"),
+    ],
+)
+def test_a_loop_that_lost_its_device_and_did_not_let_go_has_the_force_taken_away_once(
+    lost: Lost, code: int, said: str
+) -> None:
+    """A lost device may only be silent, and hold its last force."""
+    process = SimpleNamespace(poll=lambda: code, returncode=code)
+    ended = LoopProcess.__new__(LoopProcess)
+    ended.process, ended.force_seen_to = cast("subprocess.Popen[bytes]", process), False
+    for _ in range(3):
+        lost.made.turn(ended, NO_CONFIG)
+    assert lost.rescue.mock_calls == ([call(said)] if said else [])
+
+
+def test_who_has_seen_to_what_kept_the_device_away_waits_for_nothing(lost: Lost) -> None:
+    """It took up to 30 s until the next try. Again and again, it ends no try that is under way."""
+    lost.waits_s(8)
+    lost.made.hurry()
+    assert lost.waits_s(4) == pytest.approx([0.0, 1.0, 2.0, 4.0], abs=0.02)
 
 
 def test_what_comes_is_news_once_and_what_goes_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -260,7 +335,7 @@ def test_what_was_plugged_in_before_the_device_was_lost_is_no_news(
 ) -> None:
     monkeypatch.setattr(recovery, "PLACES", (tmp_path,))
     monkeypatch.setattr(recovery, "LoopStart", UnderWay)
-    made = Recovery()
+    made = Recovery(Mock())
     (tmp_path / "another").touch()
     made.begin(LOST, "unplugged")
     made.next_try_s = due_s = made.next_try_s + 100.0

@@ -6,6 +6,7 @@ import os
 import shutil
 import socket
 import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -43,6 +44,27 @@ def test_a_second_daemon_of_the_same_instance_is_refused_and_the_first_goes_on()
         assert "--instance" in outcome.stderr
         assert first.process.poll() is None
         assert (first.directory / "run" / "default" / "telemetry").exists()
+
+
+@pytest.mark.parametrize(
+    ("hook", "failure", "said"),
+    [
+        ("_open(self)", "return {}['port']", "_open: KeyError: 'port' (own.py:4)"),
+        ("__init__(self, *_)", "raise SystemExit(7)", "__init__: SystemExit: 7 (own.py:4)"),
+    ],
+)
+def test_a_driver_of_a_lab_that_fails_to_open_its_device_is_named_in_a_line(
+    tmp_path: Path, hook: str, failure: str, said: str
+) -> None:
+    """It was a traceback, and that the loop had died; an exit of its own was not even that."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/__init__.py").touch()
+    driver = (
+        f"from hapticd_drivers.loopback import Loopback\nclass Own(Loopback):\n    def {hook}:\n        {failure}\n"
+    )
+    (tmp_path / "lab/own.py").write_text(driver)
+    with Daemon('[device]\ndriver = "lab.own"\n', pythonpath=tmp_path) as daemon:
+        assert refused(daemon) == (1, [f"hapticd: driver lab.own.Own: {said}"])
 
 
 def test_a_taken_tcp_port_is_named() -> None:

@@ -14,6 +14,7 @@ from tests.daemon.test_deaths import PRESSED, nothing_left, pressing
 
 DRIVERS = '''
 """A device that is let go of slowly, and one that hangs while its force is ramped out."""
+import sys
 import time
 from pathlib import Path
 from hapticd_drivers.loopback import Loopback
@@ -28,6 +29,13 @@ class Stuck(Loopback):
         if abs(force_n[0]) < 2.0 and Path(__file__).with_name("stuck").exists():
             time.sleep(60.0)
         super()._write(force_n)
+class Clinging(Loopback):
+    """Does not let go in the programs that the file names."""
+    def _disable(self):
+        clings = Path(__file__).with_name("clings")
+        if clings.exists() and Path(sys.argv[0]).stem in clings.read_text().split():
+            raise OSError("no answer")
+        super()._disable()
 '''
 
 
@@ -37,7 +45,9 @@ def laboratory(tmp_path: Path) -> Path:
     package = tmp_path / "slow_devices-1.0.dist-info"
     package.mkdir()
     (package / "METADATA").write_text("Metadata-Version: 2.1\nName: slow-devices\nVersion: 1.0\n")
-    points = "[hapticd.drivers]\nslow = slow_devices:Slow\nstuck = slow_devices:Stuck\n"
+    points = (
+        "[hapticd.drivers]\nslow = slow_devices:Slow\nstuck = slow_devices:Stuck\nclinging = slow_devices:Clinging\n"
+    )
     (package / "entry_points.txt").write_text(points)
     return tmp_path
 
@@ -70,3 +80,27 @@ def test_a_loop_that_has_to_be_killed_at_the_end_leaves_no_force_behind(
     daemon._undo.close()
     assert daemon.state.loop.exit_code == -signal.SIGKILL
     assert "was killed; the device is without force" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("programs", "said"),
+    [
+        ("process", "; the device is without force"),
+        (
+            "process force_release hapticd",
+            "; the device did not let go: _disable: OSError: no answer (slow_devices.py:23); without the helper, the "
+            "device did not let go: _disable: OSError: no answer (slow_devices.py:23)",
+        ),
+    ],
+)
+def test_a_force_that_the_loop_could_not_take_away_is_taken_away_from_outside(
+    laboratory: Path, programs: str, said: str
+) -> None:
+    """The daemon said `stopped`, and its helper `the device is without force`, whatever the driver had raised."""
+    with Daemon(PRESSED + '[device]\ndriver = "clinging"\n', pythonpath=laboratory).wait_ready() as daemon:
+        pressing(daemon)
+        (laboratory / "clings").write_text(programs)
+        daemon.process.send_signal(signal.SIGTERM)
+        assert daemon.wait_exit() == 1, daemon.output()
+        assert f"the control loop could not take the force away{said}\n" in daemon.output()
+        assert nothing_left(daemon)

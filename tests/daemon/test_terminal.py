@@ -77,3 +77,6 @@ def test_a_daemon_whose_terminal_is_stopped_still_obeys(terminal: Terminal) -> N
     assert not terminal.has_shown("disarm")
     terminal.type(GO_ON)
     terminal.until("disarmed")
+    terminal.stop()
+    command("stop", timeout_s=PATIENCE_S)
+    assert terminal.process.wait(PATIENCE_S) == 0

@@ -18,11 +18,16 @@ FIRST = 20
 
 
 def fails(
-    monkeypatch: pytest.MonkeyPatch, long: Collection[int], computes: bool = True, before_s: float = 0.1e-3
+    monkeypatch: pytest.MonkeyPatch,
+    long: Collection[int],
+    most_computed_s: float = 1.0,
+    before_s: float = 0.1e-3,
+    first: int = FIRST,
 ) -> bool:
-    """Whether the law fails when these ticks after the first one take 0.6 ms of 1 ms, and compute for it or wait.
+    """Whether the law fails when these ticks after the first one take 0.6 ms of 1 ms.
 
-    All others take 0.1 ms, but for one before the first.
+    Of that it computes at most `most_computed_s`, and waits for the rest. All others take 0.1 ms, but
+    for one before the first.
     """
     clock = Clock(monkeypatch)
     clock.computed_ns = 0
@@ -30,13 +35,13 @@ def fails(
 
     def each_tick(number: int) -> None:
         started.shared.words[SUPERVISOR_BEAT] = clock.now_ns
-        duration_s = 0.6e-3 if number - FIRST in {0, *long} else 0.1e-3
-        started.driver.before_read = lambda: spend(before_s if number == FIRST - 10 else duration_s)
+        duration_s = 0.6e-3 if number - first in {0, *long} else 0.1e-3
+        started.driver.before_read = lambda: spend(before_s if number == first - 10 else duration_s)
 
     def spend(duration_s: float) -> None:
         clock.pass_s(duration_s)
         assert clock.computed_ns is not None
-        clock.computed_ns += round(duration_s * 1e9) if computes else 0
+        clock.computed_ns += round(min(duration_s, most_computed_s) * 1e9)
 
     started.run(each_tick, ticks=80)
     return EventCode.LAW_OVER_BUDGET in [event.code for event in started.told]
@@ -61,7 +66,21 @@ def test_the_first_only_has_it_asked_and_ten_ticks_later_that_is_forgotten(monke
 
 
 def test_a_tick_that_waits_for_its_device_has_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not fails(monkeypatch, range(1, 30), computes=False)
+    assert not fails(monkeypatch, range(1, 30), most_computed_s=0.0)
+
+
+def test_one_that_computed_for_the_very_budget_and_waited_for_the_rest_has_not_missed_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    budget_s = LoopConfig().law_budget * 1e-3
+    assert not fails(monkeypatch, [1, 2, 3], most_computed_s=budget_s)
+    assert fails(monkeypatch, [1, 2, 3], most_computed_s=budget_s + 1e-6)
+
+
+def test_also_the_first_tick_of_a_loop_only_has_it_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What its thread has computed until then, the law has not."""
+    assert not fails(monkeypatch, [1, 2], first=0)
+    assert fails(monkeypatch, [1, 2, 3], first=0)
 
 
 def test_a_tick_that_takes_the_very_budget_is_not_long_and_has_nothing_asked(monkeypatch: pytest.MonkeyPatch) -> None:

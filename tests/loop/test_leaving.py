@@ -28,7 +28,7 @@ BEFORE = ResumeState(seq=700, skipped=3, law=2, may_arm=True, latched=True, devi
 class Vanishing(Driver[DriverOptions]):
     """A device that is pressed into a wall and gone at a read or a write."""
 
-    def __init__(self, error: DriverError, at: int, where: str) -> None:
+    def __init__(self, error: Exception, at: int, where: str) -> None:
         super().__init__(DriverOptions(), 1e-3)
         self._sample = Sample(1)
         self._sample.position_m[0] = -5e-3
@@ -73,7 +73,7 @@ def nothing(_loop: ControlLoop, _number: int) -> None: ...
 def lose(
     shared: SharedMemory,
     each_tick: Callable[[ControlLoop, int], None] = nothing,
-    error: DriverError | None = None,
+    error: Exception | None = None,
     at: int = LOST_AT,
     where: str = "read",
     resume: ResumeState = FROM_START,
@@ -141,6 +141,18 @@ def test_a_fault_in_the_tick_in_which_the_device_goes_is_told_and_latched(shared
 def test_a_fault_of_the_device_itself_is_latched_from_its_first_sample_on(shared: SharedMemory, at: int) -> None:
     left = lose(shared, error=DeviceFaultError("too hot"), at=at)
     assert (left.latched, left.may_arm) == (True, False), "to clear it while the device is away does not arm"
+
+
+@pytest.mark.parametrize(("where", "at"), [("read", 0), ("read", LOST_AT), ("write", LOST_AT)])
+def test_a_driver_that_raises_anything_else_has_lost_its_device(shared: SharedMemory, where: str, at: int) -> None:
+    """Its fault is the driver's, and neither the loop's nor the law's."""
+    left = lose(shared, error=ZeroDivisionError("its own"), at=at, where=where)
+    (*_, last) = EventReader(shared).read()
+    assert last.code == EventCode.DEVICE_LOST
+    said, _, place = last.text.partition(" (")
+    assert said == "device lost: its driver failed: ZeroDivisionError: its own"
+    assert place.startswith("test_leaving.py:")
+    assert not left.latched
 
 
 def test_a_device_that_was_tared_does_not_arm_by_itself(shared: SharedMemory) -> None:

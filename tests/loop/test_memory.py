@@ -12,12 +12,16 @@ from pathlib import Path
 import msgpack
 import pytest
 
+from hapticd.config.objects import MAX_OBJECTS
+from hapticd.config.remote import MAX_PORTS
 from hapticd.config.walls import MAX_WALLS
-from hapticd.device import Metric
+from hapticd.device import MOST_METRICS, Metric
 from hapticd.errors import HapticdError
 from hapticd.loop.memory import ANSWERED, DISARM, EVENTS, RECORDS, REQUESTS, EventReader, RecordReader, SharedMemory
+from hapticd.loop.remote_slots import SlotWriter
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.record import RecordLayout, TickRecord
+from hapticd.tick.remote.update import SLOT_BYTES, Update
 from hapticd.trace import DriverTrace, lines
 from hapticd_drivers.loopback import Loopback
 
@@ -102,6 +106,7 @@ def test_a_reader_that_was_too_slow_says_how_many_it_lost(shared: SharedMemory, 
     assert [record.seq for record in records] == list(range(13 + behind - len(records), 13 + behind))
     assert all(map(whole, records))
     assert (reader.dropped == 0) == (behind <= shared.slots - 2)
+    assert len(records) == (behind if behind <= shared.slots - 2 else shared.slots // 2), "well clear of the writer"
 
 
 WRITER = """
@@ -121,7 +126,7 @@ def test_no_record_is_torn_and_every_loss_is_counted_at_full_speed(shared: Share
     """Another process writes as fast as it can; a lazy reader is overtaken all the time, in the middle of reads too."""
     reader = RecordReader(shared)
     writer = subprocess.Popen(
-        [sys.executable, "-c", WRITER, str(shared.descriptor), "1.5"],
+        [sys.executable, "-c", WRITER, str(shared.descriptor), "1.0"],
         pass_fds=[shared.descriptor],
         cwd=Path(__file__).parents[2],
         stdout=subprocess.PIPE,
@@ -238,6 +243,19 @@ def test_fields_that_do_not_fit_are_left_out_and_the_text_stays(shared: SharedMe
     assert shared.words[EVENTS] == 2
 
 
+@pytest.mark.parametrize("size", [1015, 1016, 1017, 1024, 1032, 1040])
+def test_an_event_may_be_as_long_as_its_place_and_then_goes_without_its_fields(shared: SharedMemory, size: int) -> None:
+    """1016 bytes are left behind the length; either way it is read, and so is the next one."""
+    bare = len(msgpack.packb([EventCode.SWITCHED, "", 1, 1_000_000, {"config": "y" * 256}])) - 256
+    long = event(1, config="y" * (size - bare))
+    assert len(msgpack.packb([long.code, long.text, long.seq, long.deadline_ns, long.fields])) == size
+    shared.write_event(long)
+    shared.write_event(event(2, "next"))
+    first, second = EventReader(shared).read()
+    assert first == (long if size <= 1016 else event(1))
+    assert second == event(2, "next")
+
+
 def test_a_letter_is_read_answered_and_its_verdict_read(shared: SharedMemory) -> None:
     shared.words[DISARM] = 3
     shared.post({"do": "switch", "params": {"window": 2}, "scene": {"walls": [{"at": 1.5}]}})
@@ -269,12 +287,12 @@ def test_a_second_letter_waits_for_the_answer_to_the_first(shared: SharedMemory)
     assert shared.request()["do"] == "clear"
 
 
-def test_a_letter_that_is_too_long_is_refused_and_the_box_stays_free(shared: SharedMemory) -> None:
-    with pytest.raises(HapticdError, match="bytes long"):
-        shared.post({"do": "switch", "params": "x" * (1 << 18)})
-    assert shared.words[REQUESTS] == 0
-    shared.post({"do": "switch", "params": "x" * ((1 << 18) - 100)})
-    assert len(shared.request()["params"]) == (1 << 18) - 100
+@pytest.mark.parametrize("value", [1 << 64, object(), "\udce9"])
+def test_a_letter_that_cannot_be_written_is_refused_and_the_box_stays_free(shared: SharedMemory, value: object) -> None:
+    with pytest.raises(HapticdError, match="cannot be told"):
+        shared.post({"do": "switch", "params": {"seed": value}})
+    shared.post({"do": "arm"})
+    assert shared.request() == {"do": "arm", "disarm": 0}
 
 
 @pytest.mark.parametrize("verdict", ["", "law gone", "ä" * 5000, "🙂" * 3000])
@@ -282,6 +300,15 @@ def test_a_verdict_is_read_as_far_as_it_fits(shared: SharedMemory, verdict: str)
     shared.answer(verdict)
     assert verdict.startswith(shared.verdict().rstrip("\N{REPLACEMENT CHARACTER}"))
     assert len(shared.verdict()) >= min(len(verdict), 1000)
+
+
+def test_a_verdict_takes_the_room_that_there_is_and_nothing_of_the_letter(shared: SharedMemory) -> None:
+    asked = {"do": "switch", "params": {"window": 2}, "disarm": 0}
+    shared.post({"do": "switch", "params": {"window": 2}})
+    for length in (4087, 4088, 4089, 4097, 9000):
+        shared.answer("x" * length)
+        assert shared.verdict() == "x" * min(length, 4088)
+        assert shared.request() == asked
 
 
 def test_both_sides_of_a_descriptor_see_the_same_memory(shared: SharedMemory) -> None:
@@ -306,6 +333,7 @@ def test_what_a_driver_counts_is_seen_on_the_other_side_from_the_first_on(shared
     driver.metrics[1] = 812.5
     other = SharedMemory(LAYOUT, RATE_HZ, os.dup(shared.descriptor))
     assert list(other.metrics[:3]) == [3.0, 812.5, 0.0]
+    assert len(other.metrics) == MOST_METRICS, "as many as a driver may have, and no more"
     write(other, 900)
     other.post({"do": "arm"})
     other.answer("no")
@@ -329,6 +357,29 @@ def test_a_trace_goes_on_where_another_process_reads_it(shared: SharedMemory) ->
     assert driver.trace.lines()[-1].endswith(" newest")
     assert len(driver.trace.lines()) == 4
     other.close()
+
+
+def test_there_is_room_for_all_that_clients_may_drive(shared: SharedMemory) -> None:
+    """As many objects, couplings and forces as a scene may have; what is said of the last one reaches no record."""
+    ports = [(str(number), "object") for number in range(MAX_OBJECTS + MAX_PORTS)]
+    writer = SlotWriter(shared, ports)
+    write(shared, 1)
+    for index in range(len(ports)):
+        writer.write(index, Update())
+    assert len(shared.remote) == len(ports) * SLOT_BYTES
+    assert [whole(record) for record in RecordReader(shared).read()] == [True]
+
+
+def test_of_a_memory_that_is_closed_nothing_is_left_in_the_process() -> None:
+    """A supervisor makes one each time that a device comes back."""
+    memory = SharedMemory(LAYOUT, RATE_HZ)
+    descriptor = memory.descriptor
+    mapping = f" {os.fstat(descriptor).st_ino} "
+    assert mapping in Path("/proc/self/maps").read_text()
+    memory.close()
+    assert mapping not in Path("/proc/self/maps").read_text()
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        os.fstat(descriptor)
 
 
 def test_the_history_is_eight_seconds_at_the_set_rate() -> None:

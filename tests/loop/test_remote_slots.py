@@ -138,15 +138,41 @@ def test_what_a_killed_writer_has_left_half_done_is_taken_for_no_port(
     shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
 ) -> None:
     before = SlotWriter(shared, PORTS)
-    before.write(0, at(0.1))
-    shared.remote_words[0] -= 1
-    after = SlotWriter(shared, PORTS)
-    reader.take()
-    assert ports[0].heard == []
-    assert reader.seen == shared.words[REMOTE], "and it costs no tick any more"
-    after.write(0, at(0.3))
-    reader.take()
-    assert [update.position_m[0] for update in ports[0].heard] == [0.3]
+    for index, port in enumerate(ports):
+        before.write(index, at(0.1))
+        word = index * SLOT_BYTES // 8
+        shared.remote_words[word] -= 1
+        guard = shared.remote_words[word]
+        after = SlotWriter(shared, PORTS)
+        assert shared.remote_words[word] == guard + 1, "it counts on, so that no reader takes it for what it has seen"
+        reader.take()
+        assert port.heard == []
+        assert reader.seen == shared.words[REMOTE], "and it costs no tick any more"
+        after.write(index, at(0.3))
+        reader.take()
+        assert [update.position_m[0] for update in port.heard] == [0.3]
+
+
+class Watched(Update):
+    """An update that notes how the word that guards its slot stands while it is written."""
+
+    def __init__(self, words: memoryview[int]) -> None:
+        super().__init__()
+        self.words = words
+        self.stood: list[int] = []
+
+    def __getattribute__(self, name: str) -> object:
+        if name == "stiffness_n_per_m":
+            self.stood.append(self.words[0])
+        return super().__getattribute__(name)
+
+
+def test_the_word_that_guards_a_slot_is_odd_while_it_is_written_and_only_ever_rises(shared: SharedMemory) -> None:
+    writer, update = SlotWriter(shared, PORTS), Watched(shared.remote_words)
+    for number in range(3):
+        writer.write(0, update)
+        assert update.stood == [2 * earlier + 1 for earlier in range(number + 1)]
+        assert shared.remote_words[0] == 2 * (number + 1)
 
 
 def test_an_update_for_another_list_of_ports_is_taken_for_no_name(

@@ -366,3 +366,9 @@ def test_what_is_cleared_without_a_fault_is_said_to_be_nothing_and_stays_armed(b
     assert bench.ask(do="clear") == ""
     assert bench.told()[EventCode.CLEARED].text.startswith("nothing to clear")
     assert bench.tick.guard.mode is Mode.ARMED
+
+
+def test_who_arms_a_daemon_that_is_ending_is_not_told_of_a_fault(bench: Bench) -> None:
+    bench.ticks(1)
+    bench.loop.session.stop_requested = True
+    assert bench.ask(do="arm") == "the daemon is ending"

@@ -54,6 +54,33 @@ def test_a_device_that_refuses_stays_disarmed_and_says_why(started: Started) -> 
     assert started.told[1].text == "stays disarmed: its button is pressed"
 
 
+def test_a_supervisor_that_is_silent_when_the_loop_begins_costs_the_force_as_later(started: Started) -> None:
+    stall_s = started.config.config.safety.supervisor_stall_s
+    started.shared.words[SUPERVISOR_BEAT] = round((started.clock.now_s - stall_s - 0.1) * 1e9)
+    started.run(lambda _number: None, 3)
+    assert EventCode.SUPERVISOR_STALLED in [event.code for event in started.told]
+    assert started.tick.guard.latched
+
+
+@pytest.mark.parametrize("begins", [0, 20], ids=["with the loop", "later"])
+@pytest.mark.parametrize("missed", [49, 50])
+def test_a_force_begins_without_any_deadline_missed(monkeypatch: pytest.MonkeyPatch, begins: int, missed: int) -> None:
+    """Fifty at once take it away, and not one less; the one in the tick before there was a force is none of them."""
+    started = Started(Clock(monkeypatch), auto_arm=begins == 0)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    misses = {begins - 1: 1, begins: missed}
+
+    def each_tick(number: int) -> None:
+        read_s = (misses[number] + 0.5) * 1e-3 if number in misses else 0.0
+        started.driver.before_read = lambda: started.clock.pass_s(read_s)
+        if number == begins > 0:
+            assert started.loop.session.arm()
+
+    started.run(each_tick, 40)
+    assert started.skipped == missed + (begins > 0)
+    assert (EventCode.LOOP_LATE in [event.code for event in started.told]) == (missed == 50)
+
+
 def test_an_event_before_the_first_tick_has_the_time_that_it_is(started: Started) -> None:
     now_ns = started.clock.now_ns
     started.run(lambda _number: None, 3)

@@ -25,12 +25,8 @@ def pressed(walls: int, stiffness_n_per_m: float, law: str, at_m: float) -> Load
     return parse(f"{heavy}{''.join(tables)}[controller]\nlaw = '{law}'\n", "pressed")
 
 
-def slices(walls: int, change: str) -> tuple[list[int], int]:
-    """Instructions of each slice of a switch, and of the tick of what is switched to, all walls touched."""
-    was, wanted = pressed(walls, 1000.0, "none", 0.0), pressed(walls, *CHANGES[change])
-    bench = Bench(was)
-    assert bench.ask(do="arm") == ""
-    bench.ticks(5)
+def switched(bench: Bench, was: LoadedConfig, wanted: LoadedConfig) -> list[int]:
+    """Instructions of each slice of the switch, one between two ticks."""
     bench.shared.post(switch_request(was, wanted))
     found = []
     while not bench.answered:
@@ -38,6 +34,16 @@ def slices(walls: int, change: str) -> tuple[list[int], int]:
         if not bench.answered:
             bench.ticks(1)
     assert bench.shared.verdict() == ""
+    return found
+
+
+def slices(walls: int, change: str) -> tuple[list[int], int]:
+    """Instructions of each slice of a switch, and of the tick of what is switched to, all walls touched."""
+    was, wanted = pressed(walls, 1000.0, "none", 0.0), pressed(walls, *CHANGES[change])
+    bench = Bench(was)
+    assert bench.ask(do="arm") == ""
+    bench.ticks(5)
+    found = switched(bench, was, wanted)
     assert all(contact.in_contact for contact in bench.tick.contacts)
     tick = count_operations(lambda: bench.ticks(1))
     bench.close()
@@ -57,3 +63,27 @@ def test_what_is_made_ready_for_one_wall_comes_in_slices_of_one_wall() -> None:
     eight, _ = slices(WALLS, "elsewhere, under another law")
     assert len(eight) >= len(one) + 2 * (WALLS - 1)  # its table, and its contact
     assert sorted(eight)[-4] <= max(one)  # all but taking it over, and finding which wall goes on with which
+
+
+def slices_of_balls(balls: int, apart_m: float) -> list[int]:
+    """Instructions of each slice of a reload from one ball to many, in a row."""
+    space = "[device.options]\naxes = 3\n"
+    table = "[[scene.objects]]\nname = 'b{}'\nshape = 'sphere'\nradius_m = 0.01\nposition_m = [{}, 0.0, -0.5]\n"
+    table += "stiffness_n_per_m = {}\n"
+    was, wanted = (
+        parse(space + "".join(table.format(at, at * apart_m, 1000.0 + at) for at in range(count)), "balls")
+        for count in (1, balls)
+    )
+    bench = Bench(was)
+    bench.ticks(5)
+    found = switched(bench, was, wanted)
+    bench.close()
+    return found
+
+
+@pytest.mark.parametrize("apart_m", [0.03, 0.002], ids=["apart", "over each other"])
+def test_objects_are_made_ready_one_by_one(apart_m: float) -> None:
+    """Taking them over is one slice; of those before none grows with the pairs that there are."""
+    few, many = sorted(slices_of_balls(16, apart_m)), sorted(slices_of_balls(64, apart_m))
+    assert len(many) > 3 * len(few)
+    assert many[-2] < 2 * few[-2]

@@ -9,7 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from hapticd.loop.worker import Worker
 
 PATIENCE_S = 60.0
-PRIORITY = 10
+PRIORITY = 2
+"""The lowest one that leaves room for another below it."""
 
 
 def threads() -> list[threading.Thread]:
@@ -37,9 +38,19 @@ def test_it_does_one_thing_after_the_other_and_ends() -> None:
     (thread,) = [each for each in threads() if each not in before]
     for _ in range(3):
         assert scheduled(beside) == (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)
+    assert thread.daemon, "an import that hangs does not keep the process from its end"
     beside.end()
     thread.join(PATIENCE_S)
     assert not thread.is_alive()
+
+
+def test_what_is_asked_for_before_the_thread_is_there_is_done_once_it_is() -> None:
+    done = threading.Event()
+    beside = Worker()
+    beside.do(done.set)
+    beside.start()
+    assert done.wait(PATIENCE_S)
+    beside.end()
 
 
 def test_what_was_done_is_let_go_of_before_there_is_something_else_to_do() -> None:

@@ -96,6 +96,18 @@ def test_batches_are_full_at_batch_ticks() -> None:
         assert [len(maps) for _, maps in subscriber.waiting()] == [7, 7, 7, 2]
 
 
+def test_ticks_that_would_fill_half_of_a_subscribers_queue_at_once_are_batched_by_time_alone() -> None:
+    """A supervisor without a processor for a quarter of a second passed the queue of 1000 at `batch_ticks = 1`."""
+    with Wire(batch_ticks=1) as wire:
+        subscriber = wire.subscribe()
+        wire.publisher.publish(ticks(83))
+        wire.publisher.publish(ticks(250, first=83))
+        wire.publisher.publish(ticks(2, first=333))
+        messages = [maps for topic, maps in subscriber.waiting() if topic == "hapticd/position"]
+    assert [len(maps) for maps in messages] == [1] * 83 + [20] * 12 + [10] + [1] * 2
+    assert [seq for maps in messages for seq in seqs(maps)] == list(range(335))
+
+
 def test_a_tick_waits_at_most_twenty_milliseconds() -> None:
     with Wire(batch_ticks=1000) as wire:
         subscriber = wire.subscribe("hapticd/position")
