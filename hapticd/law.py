@@ -172,7 +172,7 @@ def state_fields(law: ModuleType) -> dict[str, type[Scalar]]:
     fields: dict[str, type[Scalar]] = {}
     try:
         hints = typing.get_type_hints(law.State)
-    except Exception as error:
+    except BaseException as error:
         raise PluginError(f"law {law.__name__}: the annotations of State make no sense: {error}") from error
     for name, kind in hints.items():
         if kind not in (float, int, bool):

@@ -6,7 +6,8 @@ from functools import partial
 from typing import Any
 
 from hapticd.config.loading import LoadedConfig
-from hapticd.config.remote import PortLimits
+from hapticd.config.plugin_tables import PORT_LAW
+from hapticd.config.remote import COME_IN_S, PortLimits
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
 from hapticd.tick.contact import RunningLaw
@@ -56,4 +57,5 @@ def _make_port(
     """A coupling or a force, under the law of [remote]."""
     kind = Coupling if limits.kind == "coupling" else StreamedForce
     law = RunningLaw(config.port_law, config.port_params)
-    return kind(limits, PortSite(motion, law.another, resolution_m, config.config.loop.period_s, ramp_s))
+    come_in_s = COME_IN_S if config.config.remote.law == PORT_LAW else 0.0
+    return kind(limits, PortSite(motion, law.another, resolution_m, config.config.loop.period_s, ramp_s, come_in_s))

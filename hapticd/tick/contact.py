@@ -6,7 +6,7 @@ from copy import copy
 from types import ModuleType
 from typing import Any
 
-from hapticd.errors import PluginError
+from hapticd.errors import PluginError, in_words
 from hapticd.law import (
     LawParams,
     LawSnapshot,
@@ -18,7 +18,7 @@ from hapticd.law import (
     scalar_params,
 )
 from hapticd.tick.energy import EnergyLedger
-from hapticd.tick.guard import blended, start_blend
+from hapticd.tick.guard import blended, blended_again, start_blend
 from hapticd.tick.scene import Wall
 
 MOST = 1e18
@@ -74,7 +74,8 @@ class RunningLaw:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            raise PluginError(f"law {self.module.__name__} cannot start: {type(error).__name__}: {error}") from error
+            name = self.module.__name__
+            raise PluginError(f"law {name} cannot start: {in_words(error, name)}") from error
 
 
 class Contact:
@@ -262,7 +263,7 @@ class Contact:
             periods: time since the last tick, in periods of the loop.
         """
         if self.blending:
-            self.force_n = blended(self, self.x_m, self.requested_n, periods)
+            self.force_n = blended_again(self, self.x_m, self.requested_n, periods)
 
     def settle(self, share: float, gain: float, limit_n: float, dt_s: float) -> None:
         """Enter the tick into the books and remember what is applied from now on.

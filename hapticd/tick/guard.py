@@ -92,6 +92,18 @@ def blended(state: Any, x_m: float, force_n: float, periods: float) -> float:
     return (1.0 - weight) * old_n + weight * force_n
 
 
+def blended_again(state: Any, x_m: float, force_n: float, periods: float) -> float:
+    """The same at a tick without a new sample; a transition begins with the first one after the change.
+
+    What to go over to is not known before. Where samples are further apart than the transition takes, it would be over
+    by then, and the new force come all at once.
+    """
+    if state.blend_tick < 0.0:
+        from_n: float = state.blend_from_n
+        return from_n
+    return blended(state, x_m, force_n, periods)
+
+
 class Mode(enum.IntEnum):
     """What the guard lets through."""
 

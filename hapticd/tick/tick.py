@@ -16,7 +16,7 @@ from hapticd.config.models import SceneConfig, VelocityConfig
 from hapticd.config.ports import PortLimits, port_limits
 from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo, Sample
-from hapticd.errors import ConfigError
+from hapticd.errors import ConfigError, in_words
 from hapticd.tick import fallback
 from hapticd.tick.arrangement import Arrangement, arrange
 from hapticd.tick.contact import Contact, RunningLaw
@@ -112,6 +112,8 @@ class ControlTick:
         self.couplings: list[OnePort] = [self._port(port) for port in port_limits(scene) if port.kind != "object"]
         self.leaving_ports: list[OnePort] = []
         self.past_ports = Totals()
+        for port in self.couplings:
+            port.join()
         self._gather()
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         self._blind = self._calibrated = True
@@ -205,6 +207,16 @@ class ControlTick:
             ConfigError: the scene or the limits do not fit the device; nothing has changed then.
             PluginError: the law cannot start; nothing has changed then.
         """
+        return self._switch(scene, safety, make_law, lambda: None)
+
+    def _switch(
+        self,
+        scene: SceneConfig | None,
+        safety: SafetyConfig | None,
+        make_law: Callable[[], RunningLaw] | None,
+        start_more: Callable[[], object],
+    ) -> Generator[None, None, None]:
+        """The same; laws of what is beside walls, couplings and forces start with theirs, in the tick that takes it."""
         if safety is not None:
             limits(safety, self.info)
         make = self.make_law if make_law is None else make_law
@@ -232,6 +244,7 @@ class ControlTick:
         for contact in there.new:
             contact.start(self.motion.position_m[contact.wall.axis])
         self._start_laws(laws)
+        start_more()
         # From here on nothing can fail.
         self.make_law = make
         if safety is not None:
@@ -397,7 +410,7 @@ class ControlTick:
         for port in [port for port in self.leaving_ports if port.asleep]:
             self.past_ports.add_moving(port.books)
             self.leaving_ports.remove(port)
-            port.channels = []  # they know it, and in the loop no collector looks for circles
+            port.part()
         self.leaving_ports += arrangement.gone
         self.couplings = arrangement.ports
         for port in self.couplings:
@@ -441,13 +454,10 @@ class ControlTick:
 
     def _replace_laws(self, contact: Contact, error: BaseException, periods: float) -> None:
         """A law raised or returned nonsense: all are replaced, and asked again."""
-        try:
-            text = f"{type(error).__name__}: {error}"
-        except Exception:  # noqa: BLE001 - an exception of anybody's making need not even be printable
-            text = type(error).__name__
         frames = {frame.f_globals.get("__name__") for frame, _ in walk_tb(error.__traceback__)}
         failed = next((each for each in self._active if each.law.module.__name__ in frames), contact)
-        self.fail_law(EventCode.LAW_FAILED, f"law {failed.law.module.__name__}: {text}")
+        name = failed.law.module.__name__
+        self.fail_law(EventCode.LAW_FAILED, f"law {name}: {in_words(error, name)}")
         for each in self._active:
             each.act(periods)
 

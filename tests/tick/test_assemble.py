@@ -1,11 +1,13 @@
-"""A simulated device gets to know the wall that its hand goes to."""
+"""What a configuration makes of a device: its tick, or why not, and for a simulated one where the wall is."""
 
 from __future__ import annotations
 
 import pytest
 
 from hapticd.config.loading import parse
-from hapticd.tick.assemble import place_device
+from hapticd.errors import ConfigError
+from hapticd.tick.assemble import make_tick, place_device
+from tests.tick.rig import device
 
 WALL = '[[scene.walls]]\nstiffness_n_per_m = 1000.0\nposition_m = {}\nfree_side = "{}"\n'
 
@@ -31,3 +33,19 @@ def test_without_a_wall_a_device_stays_where_it_is() -> None:
     driver = Placed()
     place_device(parse("", "x"), driver)
     assert driver.told == []
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("[safety]\nmax_force_n = 500.0\n", "max_force_n"),
+        ('[velocity]\nestimator = "device"\n', "velocity.estimator"),
+        (WALL.format(0.0, "positive") + 'axis = "x"\n' + WALL.format(0.0, "positive") + 'axis = "y"\n', "walls[1]"),
+    ],
+)
+def test_what_does_not_fit_the_device_is_told_with_the_file_that_says_it(text: str, problem: str) -> None:
+    with pytest.raises(ConfigError) as raised:
+        make_tick(parse(text, "lab.toml"), device())
+    (said,) = raised.value.problems
+    assert said.startswith("lab.toml: ")
+    assert problem in said

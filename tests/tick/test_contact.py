@@ -141,7 +141,7 @@ def test_a_new_law_is_shown_the_contact_as_it_is_not_as_the_old_one_left_it() ->
         (-0.002, 1, 1, 1e-5)
     )
     assert (shown.velocity_m_per_s, shown.dt_s, shown.in_contact) == (0.1, PERIOD_S, True)
-    assert (shown.contact_n, shown.spring_n) == pytest.approx((1.0, 2.0))
+    assert (shown.contact_n, shown.spring_n, shown.moved_m) == pytest.approx((1.0, 2.0, -0.012))
 
 
 def test_a_change_of_the_wall_comes_at_its_tick() -> None:

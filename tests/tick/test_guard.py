@@ -330,3 +330,24 @@ def test_a_limit_on_the_whole_force_goes_up_by_a_ramp_also_where_no_axis_may_hav
     assert lengths[0] == pytest.approx(6.0 + 2.0 / 50.0)
     assert lengths[24] == pytest.approx(7.0)
     assert lengths[-1] == pytest.approx(math.hypot(5.0, 5.0))
+
+
+def test_where_nothing_changes_a_tick_is_spared_the_look_at_what_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also once a change has come to its end."""
+    looks: list[float] = []
+    change = Guard._change
+
+    def look(self: Guard, dt_s: float) -> None:
+        looks.append(dt_s)
+        change(self, dt_s)
+
+    monkeypatch.setattr(Guard, "_change", look)
+    made = armed()
+    made.configure(SafetyConfig(max_force_n=2.0, ramp_s=5.0 * PERIOD_S), device(), [8.0])
+    written(made, 8.0, 40)
+    assert made.limit_n == 2.0
+    assert len(looks) < 10
+    made.release(5.0 * PERIOD_S)
+    written(made, 1.0, 40)
+    assert made.mode is Mode.DISARMED
+    assert len(looks) < 20

@@ -16,14 +16,15 @@ from tests.tick.transitions import pressed
 
 
 def learner(learned: tuple[str, ...] = ()) -> tuple[ModuleType, list[float]]:
-    """A law that publishes 30 N s/m, and what it found when it started."""
+    """A law that publishes 30 N s/m and 0.4 kg, and what it found when it started."""
     found: list[float] = []
 
     def start(state: Any, _params: Any, snapshot: Any) -> None:
         found.append(snapshot.damping_n_s_per_m)
-        state.damping_n_s_per_m = 30.0
+        state.damping_n_s_per_m, state.felt_mass_kg = 30.0, 0.4
 
-    module = law(lambda _state, _params, tick: tick.contact_n, start, {"damping_n_s_per_m": float})
+    fields: dict[str, type] = {"damping_n_s_per_m": float, "felt_mass_kg": float}
+    module = law(lambda _state, _params, tick: tick.contact_n, start, fields)
     module.__dict__["LEARNED"] = learned
     return module, found
 
@@ -42,10 +43,11 @@ def test_what_one_law_published_is_not_said_of_the_next() -> None:
     """A law without damping publishes none, so nothing would ever overwrite what the one before has left."""
     first, _ = learner()
     rig = pressed(module=first)
-    assert rig.tick.contacts[0].damping_n_s_per_m == 30.0
+    contact = rig.tick.contacts[0]
+    assert (contact.damping_n_s_per_m, contact.felt_mass_kg) == (30.0, 0.4)
     rig.switch(make_law=running(none))
     rig.force(-2e-3)
-    assert rig.tick.contacts[0].damping_n_s_per_m == 0.0
+    assert (contact.damping_n_s_per_m, contact.felt_mass_kg) == (0.0, 0.0)
 
 
 def test_after_the_fallback_a_law_starts_without_the_fallbacks_damping() -> None:

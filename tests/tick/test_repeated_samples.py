@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from hapticd.config.models import VelocityConfig
-from tests.tick.rig import Rig
+from tests.tick.rig import LIMIT_N, Rig, scene
+from tests.tick.transitions import TRANSITIONS, pressed
 
 PERIOD_S = 2.5e-4
 SPEED_M_PER_S = 0.6
@@ -60,3 +61,34 @@ def test_the_time_that_a_law_is_told_is_the_time_that_passed() -> None:
         if fresh:
             told.append(rig.tick.motion.dt_s)
     assert told == pytest.approx([3 * PERIOD_S] * 20)
+
+
+def test_a_wall_that_goes_between_two_samples_holds_its_force_until_there_is_a_new_one_and_closes_its_books() -> None:
+    """Also where its ramp is shorter than the time between them: its new law has not been asked yet. Then it ramps."""
+    rig = pressed(has_sequence=True, safety={"ramp_s": 0.002})
+    rig.switch(scene())
+    for _ in range(6):
+        assert rig.tick.step(rig.sample, 1e-3) == [4.0]
+    assert [rig.force(-1e-3) for _ in range(3)] == [2.0, 1.0, 0.0]
+    assert rig.tick.leaving == []
+    energy_j, stored_j, dissipated_j, generated_j = rig.books_j
+    assert energy_j == pytest.approx(rig.energy_j) == pytest.approx(-4e-3)
+    assert energy_j == pytest.approx(stored_j + dissipated_j - generated_j)
+    assert stored_j == 0.0
+
+
+@pytest.mark.parametrize("transition", TRANSITIONS)
+def test_a_ramp_that_is_shorter_than_the_time_between_two_samples_makes_no_step(transition: str) -> None:
+    """It was over before the law had seen a sample of the new wall, or the new law any, and that came all at once."""
+    change, goal_n = TRANSITIONS[transition]
+    ramp, between = 12, 20
+    rig = pressed(has_sequence=True, nominal_rate_hz=50.0, safety={"ramp_s": ramp * 1e-3})
+    forces_n = []
+    for number in range(5 * between):
+        if number == 3:
+            change(rig)
+        rig.sample.sequence += number % between == 0
+        forces_n.append(rig.tick.step(rig.sample, 1e-3)[0])
+    most_n = 2.0 * LIMIT_N / ramp  # between any two forces that are within the limit
+    assert max(abs(later - before) for before, later in itertools.pairwise(forces_n)) <= most_n * (1.0 + 1e-9)
+    assert forces_n[-1] == pytest.approx(goal_n)

@@ -38,6 +38,7 @@ def test_a_wall_without_damping_never_looks_at_the_velocity() -> None:
 
 def test_the_springs_part_of_the_force_is_known_apart() -> None:
     damped = wall(1000.0, damping_n_s_per_m=3.0)
+    assert damped.spring_n == 0.0, "nothing has touched it: a reload puts it under a device between two samples"
     damped.force(-0.002, 0.5)
     assert damped.spring_n == 2.0
 

@@ -16,7 +16,7 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
 from hapticd_controllers import energy_cycle, none, tdpa
 from tests.examples import examples
-from tests.tick.rig import LIMIT_N, RAMP_TICKS, Rig, largest_step, wall
+from tests.tick.rig import LIMIT_N, RAMP_TICKS, Rig, largest_step, law, wall
 from tests.tick.transitions import TRANSITIONS, pressed
 
 
@@ -123,6 +123,41 @@ def test_after_a_blind_moment_neither_velocity_nor_books_see_a_jump() -> None:
         rig.force(-22e-3)
         assert rig.tick.motion.velocity_m_per_s == [0.0]
     assert rig.books_j[0] == energy_j
+
+
+def test_after_a_blind_moment_a_law_is_told_that_nothing_was_applied_and_nothing_moved() -> None:
+    """The one that was there, and the one that comes with the next arming."""
+    shown: list[tuple[float, float, float]] = []
+
+    def step(_state: Any, _params: Any, tick: Any) -> float:
+        shown.append((tick.applied_n, tick.applied_contact_n, tick.moved_m))
+        force_n: float = tick.contact_n
+        return force_n
+
+    rig = pressed(module=law(step))
+    assert shown[-1] == (4.0, 4.0, 0.0)
+    rig.forces(math.nan, 20)
+    rig.force(-3e-3)
+    rig.tick.guard.clear()
+    assert rig.tick.arm()
+    rig.force(-3e-3)
+    assert shown[-2:] == [(0.0, 0.0, 0.0)] * 2
+
+
+def test_a_device_that_does_not_know_where_it_is_is_said_to_rest_at_the_origin() -> None:
+    motion = Rig(wall(2000.0), at_m=math.nan, arm=False).tick.motion
+    assert (motion.position_m, motion.velocity_m_per_s) == ([0.0], [0.0])
+
+
+def test_where_positions_count_from_elsewhere_nothing_is_asked_for_until_there_is_a_new_sample() -> None:
+    rig = pressed(has_sequence=True)
+    rig.tick.release(0.001)
+    rig.force(-2e-3, ticks=3)
+    assert rig.tick.requested_n == [4.0]
+    assert rig.tick.tare()
+    rig.tick.step(rig.sample, 1e-3)
+    assert rig.tick.requested_n == [0.0]
+    assert rig.tick.contacts[0].force_n == 0.0
 
 
 @pytest.mark.parametrize("name", TRANSITIONS)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable
 from decimal import Decimal
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -183,9 +185,12 @@ def test_the_fallback_damps_while_the_force_is_ramped_out() -> None:
 
 def test_an_interrupt_from_the_keyboard_is_no_fault_of_the_law() -> None:
     """A study is stopped by it; the control process never sees one."""
-    rig = Rig(wall(2000.0), at_m=0.0, module=law(raises(KeyboardInterrupt())))
+    interrupted = law(raises(KeyboardInterrupt()), raises(KeyboardInterrupt()))
+    rig = Rig(wall(2000.0), at_m=0.0, module=law(interrupted.step))
     with pytest.raises(KeyboardInterrupt):
         rig.force(-1e-3)
+    with pytest.raises(KeyboardInterrupt):
+        rig.switch(make_law=running(interrupted))
 
 
 @pytest.mark.parametrize("error", [ValueError("no"), SystemExit(2), Rude()])
@@ -211,6 +216,34 @@ def test_a_law_that_cannot_start_changes_nothing(error: BaseException) -> None:
     rig.tick.release()
     rig.force(-2e-3, ticks=60)
     assert rig.tick.arm()
+
+
+UNDECLARED = """
+from hapticd.law import LawParams
+class Params(LawParams): pass
+class State:
+    seen: float
+def start(state, params, snapshot):
+    state.seen = snapshot.x_m{0}
+def step(state, params, tick):
+    return state.speed * params.gain if tick.x_m < -2e-3 else tick.contact_n
+"""
+
+
+def test_a_law_that_uses_a_field_that_it_does_not_declare_is_told_where_and_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "undeclared.py").write_text(UNDECLARED.format(""))
+    (tmp_path / "at_start.py").write_text(UNDECLARED.format("; state.begun = 1.0"))
+    monkeypatch.syspath_prepend(tmp_path)
+    rig = pressed(wall(2000.0))
+    with pytest.raises(PluginError) as refused:
+        rig.switch(make_law=running(importlib.import_module("at_start")))
+    said = "has no field {0}: declare it there, `{0}: float` ({1})"
+    assert str(refused.value) == f"law at_start cannot start: State {said.format('begun', 'at_start.py:7')}"
+    rig.switch(make_law=running(importlib.import_module("undeclared")))
+    rig.force(-3e-3)
+    assert rig.tick.fault_text == f"law undeclared: State {said.format('speed', 'undeclared.py:9')}"
 
 
 def test_a_law_that_cannot_start_cannot_be_armed() -> None:

@@ -209,6 +209,30 @@ def test_an_unchanged_wall_keeps_its_clock_its_law_and_its_books_wherever_it_sta
     assert rig.forces(-1e-3, 1) == [4.0]
 
 
+def test_a_wall_that_goes_while_the_force_is_limited_turns_it_by_a_ramp() -> None:
+    """The one that stays asks for more than it had of the limit, and takes it over no faster than the other lets go."""
+    both = [wall(10_000.0, "x"), wall(10_000.0, "y")]
+    rig = Rig(*both, axes="xy", at_m=0.0)
+    rig.at(-2e-3, -2e-3, ticks=2)
+    rig.switch(scene(both[1]))
+    forces = rig.at(-2e-3, -2e-3, ticks=RAMP_TICKS + 2)
+    assert forces[0] == pytest.approx([LIMIT_N / math.sqrt(2.0)] * 2)
+    assert forces[-1] == pytest.approx([0.0, LIMIT_N])
+    for axis in (0, 1):
+        assert largest_step([force_n[axis] for force_n in forces]) <= 2.0 * RAMP_STEP_N
+
+
+def test_a_wall_that_had_not_faded_out_does_not_come_back_with_the_next_arming() -> None:
+    rig = pressed()
+    rig.switch(scene())
+    rig.force(-2e-3, ticks=10)
+    rig.tick.release(0.005)
+    assert rig.force(-2e-3, ticks=6) == 0.0
+    assert rig.tick.leaving
+    arm_again(rig)
+    assert rig.forces(-2e-3, RAMP_TICKS) == [0.0] * RAMP_TICKS
+
+
 def test_a_wall_that_changed_in_place_keeps_law_and_books_and_starts_its_clock_anew() -> None:
     rig = pressed(module=energy_cycle)
     contact = rig.tick.contacts[0]

@@ -11,7 +11,8 @@ import pytest
 from hapticd.errors import PluginError
 from hapticd.law import check_law
 from hapticd.offline.operations import count_operations
-from tests.tick.rig import PERIOD_S, Rig, law, wall
+from hapticd.tick.event import EventCode
+from tests.tick.rig import PERIOD_S, Rig, law, scene, wall
 
 
 class Asked:
@@ -45,6 +46,15 @@ def test_a_law_that_rests_is_asked_until_it_has_seen_its_last_force_end() -> Non
     assert len(asked.shown) == 5
     assert [shown[3] for shown in asked.shown[3:]] == [False, False]
     assert [shown[4] for shown in asked.shown[3:]] == [pytest.approx(2.0), 0.0]
+
+
+def test_on_the_very_face_of_a_wall_it_is_not_touched() -> None:
+    asked = Asked(True)
+    rig = tapped(asked)
+    rig.force(0.0, ticks=3)
+    assert len(asked.shown) == 5
+    rig.force(-5e-324)
+    assert len(asked.shown) == 6
 
 
 @pytest.mark.parametrize("rests", [None, False])
@@ -90,14 +100,42 @@ def test_walls_that_rest_take_no_part_in_force_or_books() -> None:
     assert [contact.awake for contact in among.tick.contacts[1:]] == [False] * 7
 
 
+def test_books_are_kept_once_more_after_a_touch_and_then_wait_whatever_the_law_does() -> None:
+    rig = Rig(wall(2000.0), module=Asked(False).module, at_m=0.0)
+    rig.force(-1e-3)
+    rig.force(0.02)
+    costs = [count_operations(partial(rig.force, 0.02)) for _ in range(3)]
+    assert costs[0] > costs[1] == costs[2]
+
+
+def test_under_the_fallback_a_wall_rests_outside_as_well() -> None:
+    rig = tapped(Asked(False))
+    rig.tick.fail_law(EventCode.LAW_OVER_BUDGET, "slow")
+    rig.force(0.02, ticks=3)
+    assert not rig.tick.contacts[0].awake
+
+
+def test_a_wall_that_has_gone_costs_nothing_any_more() -> None:
+    never, gone = Rig(at_m=0.0), Rig(wall(2000.0), at_m=0.0)
+    gone.force(-1e-3)
+    gone.switch(scene())
+    for rig in (never, gone):
+        rig.force(-1e-3, ticks=100)
+    assert count_operations(partial(gone.force, -1e-3)) == count_operations(partial(never.force, -1e-3))
+
+
 def test_what_rests_is_woken_by_a_change_of_where_it_is() -> None:
     """A tare moves the wall over the device."""
-    rig = tapped(Asked(True))
+    asked = Asked(True)
+    rig = tapped(asked)
     rig.tick.release(0.001)
     rig.force(0.02, ticks=3)
     assert rig.tick.tare()
     assert rig.tick.contacts[0].awake
     assert rig.tick.contacts[0].x_m == 0.0
+    asked.shown.clear()
+    rig.force(0.02, ticks=10)
+    assert len(asked.shown) == 1, "it is shown that, and rests again"
 
 
 def test_a_law_says_so_with_true_or_false() -> None:
@@ -118,3 +156,20 @@ def test_eight_walls_of_which_one_is_touched_cost_less_than_two() -> None:
         rig.force(-1e-3, ticks=5)
         costs.append(count_operations(partial(rig.force, -1e-3)))
     assert costs[0] < costs[2] < costs[1]
+
+
+@pytest.mark.parametrize("field", ["", "damping_n_s_per_m", "felt_mass_kg"])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_plain_number_of_a_law_is_taken_as_it_is_and_any_other_costs_more(field: str, sign: int) -> None:
+    def costs(said: float) -> int:
+        def step(state: Any, _params: Any, tick: Any) -> float:
+            if field:
+                setattr(state, field, said)
+            return tick.contact_n if field else said
+
+        rig = Rig(wall(2000.0), module=law(step, fields={field: float} if field else None), at_m=0.0)
+        rig.force(-1e-3, ticks=5)
+        assert rig.tick.fault == 0
+        return count_operations(partial(rig.force, -1e-3))
+
+    assert costs(sign * 2.0) < costs(sign * 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -212,3 +213,21 @@ def test_who_starts_anew_stands_where_it_is_told(keys: dict[str, Any]) -> None:
     assert made.update(0.5, 0.0, 0.0) == 0.0
     assert made.update(0.5, 1e-3, 0.0) == 0.0
     assert 0.0 < made.update(0.501, 1e-3, 0.0) <= 1.0 + 1e-9
+
+
+def test_a_low_pass_reckons_its_share_anew_where_the_period_is_another_one_and_only_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An exponential each tick is what it spares."""
+    asked: list[float] = []
+
+    def reckon(exponent: float, expm1: Callable[[float], float] = math.expm1) -> float:
+        asked.append(exponent)
+        return expm1(exponent)
+
+    made = LowPass(3.0)
+    made.start(0.0)
+    monkeypatch.setattr(math, "expm1", reckon)
+    for dt_s in (1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 1e-3):
+        made.update(1e-3, dt_s, 0.0)
+    assert asked == pytest.approx([-math.tau * 3.0 * dt_s for dt_s in (1e-3, 2e-3, 1e-3)])

@@ -50,6 +50,16 @@ def test_a_wall_that_stays_keeps_its_clock_and_another_one_starts_its_own() -> N
     assert recorded(rig) == [0.0, 0.0]
 
 
+def test_of_two_walls_in_one_place_each_stays_itself_in_another_order() -> None:
+    one, other = changing(1.0, 0.01), changing(2.0, 0.02)
+    rig = Rig(one, other)
+    recorded(rig, 8)
+    rig.switch(scene(other, one))
+    assert recorded(rig, 2) == [2.0, 1.0]
+    assert recorded(rig) == [2.0, 0.0]
+    assert recorded(rig, 10) == [0.0, 0.0]
+
+
 def test_two_equal_walls_have_a_clock_each() -> None:
     same = changing(1.0, 0.01)
     rig = Rig(same)

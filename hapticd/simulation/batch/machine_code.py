@@ -10,7 +10,7 @@ from numba import njit
 
 from hapticd.simulation.batch.kernel import bound
 from hapticd.simulation.batch.state import LoopBuffers
-from hapticd.simulation.compiler.compile import OPTIONS, compiled, compiled_step, on_stack
+from hapticd.simulation.compiler.compile import INNER, OPTIONS, compiled, compiled_step, on_stack
 from hapticd.simulation.plant import Buffers
 
 
@@ -24,7 +24,7 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
     memo = {law.step: compiled_step(law)}
     loop = compiled(bound(dict(switches), law.step), memo)
 
-    @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
+    @njit(**INNER)  # type: ignore[untyped-decorator]  # numba publishes no types
     def one(at: Any, arrays: Any) -> None:
         plant = on_stack(arrays.plants[at])
         state = on_stack(arrays.loops[at])

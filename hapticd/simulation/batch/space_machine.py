@@ -15,7 +15,7 @@ from hapticd.shapes.reach import Nearby, slack_m
 from hapticd.shapes.solid import Part, Proxy
 from hapticd.simulation.batch.space_kernel import SpaceLoop, run
 from hapticd.simulation.compiler.classes import Form, Machine, as_tuple
-from hapticd.simulation.compiler.compile import param_kinds, refuse
+from hapticd.simulation.compiler.compile import OPTIONS, param_kinds, refuse
 from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.plant import PlantParams, PlantState, move, sense
 from hapticd.simulation.space.coupled import place_of, swing
@@ -129,7 +129,7 @@ class SpaceMachine:
         if self._run is None or missing:
             self._terms = {name: on or self._terms.get(name, False) for name, on in needed.items()}
             plant = {"move": specialise(move, self._terms), "sense": specialise(sense, self._terms)}
-            self._run = Machine({}, plant, on=self.classes).compiled(run)
+            self._run = Machine({}, plant, on=self.classes).compiled(run, OPTIONS)
         return self._run
 
 

@@ -21,8 +21,10 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
-OPTIONS: dict[str, Any] = {"error_model": "python", "fastmath": False, "nogil": True}
-"""As Python computes, a division by zero included."""
+from hapticd.simulation.compiler.compile import INNER
+
+_AS_PYTHON: dict[str, Any] = {"error_model": "python"}
+"""A division by zero included."""
 
 _SCALARS = {float: np.float64, int: np.int64, bool: np.bool_}
 
@@ -109,28 +111,33 @@ class Machine:
                 fields.append((name, self.dtype(one, lists), (most,)))
         return np.dtype(fields, align=True)
 
-    def compiled(self, function: Callable[..., Any]) -> Any:
-        """The machine code of a plain function and of every plain function that it calls."""
+    def compiled(self, function: Callable[..., Any], options: Mapping[str, Any] = INNER) -> Any:
+        """The machine code of a plain function and of every plain function that it calls.
+
+        Args:
+            function: interpreted.
+            options: `INNER`, or `OPTIONS` for one that Python is to call as well.
+        """
         if function not in self._memo:
             assert isinstance(function, FunctionType)
             if function.__module__ in self._modules:
-                return self._rewritten(function, Form(), ())
+                return self._rewritten(function, Form(), (), options)
             names = dict(function.__globals__)
             copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
             copy.__module__ = function.__module__
-            self._link(function, copy, names)
+            self._link(function, copy, names, options)
         return self._memo[function]
 
-    def _link(self, original: Any, copy: FunctionType, names: dict[str, Any]) -> Any:
+    def _link(self, original: Any, copy: FunctionType, names: dict[str, Any], options: Mapping[str, Any]) -> Any:
         """Compile a function that finds compiled ones, and what stands for something else, under its names."""
-        self._memo[original] = machine = njit(copy, **OPTIONS)
+        self._memo[original] = machine = njit(copy, **{**options, **_AS_PYTHON})
         for name in copy.__code__.co_names:
             names.update({name: self._names[name]} if name in self._names else {})
             if isinstance(names.get(name), FunctionType) and not name.startswith(_CALL):
                 names[name] = self.compiled(names[name])
         return machine
 
-    def _rewritten(self, function: Any, form: Form, takes: tuple[str, ...]) -> Any:
+    def _rewritten(self, function: Any, form: Form, takes: tuple[str, ...], options: Mapping[str, Any] = INNER) -> Any:
         assert isinstance(function, FunctionType)
         tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
         definition = tree.body[0]
@@ -149,7 +156,7 @@ class Machine:
         exec(compile(tree, inspect.getfile(function), "exec"), names)
         made = names[function.__name__]
         names[function.__name__] = function.__globals__.get(function.__name__)
-        return self._link((function, form) if form.methods else function, made, names)
+        return self._link((function, form) if form.methods else function, made, names, options)
 
 
 def fill(row: Any, source: Any) -> None:

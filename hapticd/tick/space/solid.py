@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from copy import copy
 from functools import lru_cache
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from hapticd.config.objects import (
     MAX_SPEED_M_PER_S,
@@ -22,6 +22,8 @@ from hapticd.errors import ConfigError
 from hapticd.shapes.field import Field
 from hapticd.shapes.pose import Pose
 from hapticd.shapes.solid import Placed, Proxy, group, part_distance
+
+T = TypeVar("T")
 
 FASTEST_M_PER_S = 5.0
 """A device that is faster may be inside a thin object before it is looked for [m/s]."""
@@ -190,8 +192,18 @@ def _field(file: Path, _changed_ns: int, _size: int) -> Field:
         raise ConfigError(f"file = {file}: {error}") from None
 
 
-def compile_objects(objects: Sequence[ObjectConfig], period_s: float) -> list[Solid]:
-    """The solids of a scene, in the order of their first objects.
+def at_once(steps: Generator[None, None, T]) -> T:
+    """What comes of steps, for which nothing else has to wait."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            done: T = end.value
+            return done
+
+
+def compile_objects(objects: Sequence[ObjectConfig], period_s: float) -> Generator[None, None, list[Solid]]:
+    """The solids of a scene, in the order of their first objects. No step does more than an object needs.
 
     Raises:
         ConfigError: a shape that is not possible.
@@ -202,14 +214,17 @@ def compile_objects(objects: Sequence[ObjectConfig], period_s: float) -> list[So
             shapes.append(placed(config))
         except ConfigError as error:
             raise ConfigError(f'scene.objects[{index}] "{config.name}": {error}') from None
+        yield
     # What a client moves is no part of another solid.
     surfaces = [
         (*(getattr(config, key) for key in _SURFACE), config.name if config.remote else "") for config in objects
     ]
-    return [
-        Solid([objects[at] for at in members], members, period_s)
-        for members in sorted(group(shapes, surfaces), key=lambda members: members[0])
-    ]
+    groups = yield from group(shapes, surfaces)
+    solids = []
+    for members in sorted(groups, key=lambda members: members[0]):
+        solids.append(Solid([objects[at] for at in members], members, period_s))
+        yield
+    return solids
 
 
 def _without_place(configs: Sequence[ObjectConfig]) -> list[dict[str, Any]]:

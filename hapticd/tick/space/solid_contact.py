@@ -330,9 +330,12 @@ class SolidContact:
         )
 
     def _rest(self) -> None:
-        """Be out of touch: nothing is left to do once laws that keep time have had the time that they look at."""
+        """Be out of touch: nothing is left to do a sample later, or once a law that keeps time has had its time.
+
+        By that sample no force is held any more, with which the ledger ends the touch.
+        """
         self.normal.held_n = 0.0
-        self.quiet = self.normal.law.rests or self._outside_s > OUTSIDE_S
+        self.quiet = self._outside_s > (0.0 if self.normal.law.rests else OUTSIDE_S)
 
     def _lose(self, velocity: Vector, way: Vector, dt_s: float) -> bool:
         """See a sample out of touch."""
@@ -356,7 +359,6 @@ class SolidContact:
         self.grip = 0
         for channel in self.channels[: self.sides]:
             channel.in_contact = depth_m > 0.0
-            channel.x_m = -depth_m
         self.normal.x_of_law_m = -depth_m
         self.normal.held_n = self._moved_m = self._outside_s = 0.0
         self._away = False

@@ -19,7 +19,7 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Guard, Mode
 from hapticd.tick.space.books import SpaceBooks, Totals
 from hapticd.tick.space.channel import Channel
-from hapticd.tick.space.solid import Solid, compile_objects
+from hapticd.tick.space.solid import Solid, at_once, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
 from hapticd.tick.tick import ControlTick, MakePort
 
@@ -67,7 +67,10 @@ class SpaceTick(ControlTick):
         super().__init__(scene, velocity, guard, info, make_law, period_s, ramp_s, make_port)
         self._make_remote = make_remote
         limits = _object_limits(scene)
-        self.solids = [self._contact(solid, make_law, limits) for solid in compile_objects(scene.objects, period_s)]
+        solids = at_once(compile_objects(scene.objects, period_s))
+        self.solids = [self._contact(solid, make_law, limits) for solid in solids]
+        for each in self._moving():
+            each.join()
         self.objects = len(scene.objects)
         self.listing = 0
         self.awake: list[SolidContact] = []
@@ -109,8 +112,7 @@ class SpaceTick(ControlTick):
         new: list[SolidContact] = []
         kept: list[tuple[SolidContact, Solid]] = []
         if scene is not None:
-            solids = compile_objects(scene.objects, self.period_s)
-            yield
+            solids = yield from compile_objects(scene.objects, self.period_s)
             known = {(contact.solid.name, contact.moves): contact for contact in self.solids}
             there = []
             for solid in solids:
@@ -132,11 +134,14 @@ class SpaceTick(ControlTick):
                 yield
         fresh = [channel for contact in new for channel in contact.channels]
         fresh += [channel for _, _, channels in changed for channel in channels]
-        for contact in new:
-            contact.start(*self._at)
         laws += [(channel, channel.law) for channel in fresh]
-        self._start_laws(laws)
-        yield from super().switch(scene, safety, make_law)
+
+        def start() -> None:
+            for contact in new:
+                contact.start(*self._at)
+            self._start_laws(laws)
+
+        yield from self._switch(scene, safety, make_law, start)
         # From here on nothing can fail.
         limit_n = self.guard.limit_n
         before = _places(self.solids)
@@ -158,6 +163,7 @@ class SpaceTick(ControlTick):
         if scene is not None:
             self.objects = len(scene.objects)
             for each in self._moving():
+                each.join()
                 each.ramp_s = self.ramp_s
                 each.port.change(limits[each.port.name])
         if self.fallback:
@@ -339,6 +345,7 @@ class SpaceTick(ControlTick):
         """Have what a contact applies fade out beside it."""
         shade = contact.shade(_no_law)
         self._fading.append(shade)
+        self._held.append(shade)  # also at a tick without a new sample
         for channel in shade.channels:
             self._blend(channel)
 

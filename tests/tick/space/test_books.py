@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -100,3 +101,16 @@ def test_friction_takes_what_slipping_takes_and_holds_what_sticks() -> None:
     assert rig.totals.friction_j == pytest.approx(rig.energy_j - before_j, rel=0.1)
     assert rig.totals.friction_j == pytest.approx(1.0 * 0.01, rel=0.05)  # and what it had stored in sticking
     assert rig.unbalanced_j() < 1e-14
+
+
+@pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
+def test_what_the_spring_holds_is_out_of_the_books_once_it_is_left_or_the_device_stands_anew(rough: bool) -> None:
+    keys: dict[str, Any] = {"static_friction": 0.5, "dynamic_friction": 0.4} if rough else {}
+    rig = Rig(ball(**keys), "none").start((0.0, 0.0, 0.0295)).to((0.0, 0.0, 0.0294), 10)
+    assert rig.totals.ledger.stored_j == pytest.approx(0.5 * 5000.0 * 6e-4**2)
+    rig.to((0.0, 0.0, 0.031), 20)
+    assert rig.totals.ledger.stored_j == 0.0
+    rig.to((0.0, 0.0, 0.0295), 20).start((0.0, 0.0, 0.031))
+    rig.force = (0.0, 0.0, 0.0)
+    assert rig.go((0.0, 0.0, 0.031)).totals.ledger.stored_j == 0.0
+    assert rig.unbalanced_j() < 1e-15

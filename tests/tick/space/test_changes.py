@@ -5,10 +5,15 @@ from __future__ import annotations
 import dataclasses
 import math
 from contextlib import nullcontext
+from itertools import pairwise
+from typing import Any
 
 import pytest
 
+from hapticd import plugins
 from hapticd.errors import ConfigError
+from hapticd.law import LawSnapshot
+from hapticd.tick import fallback
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.contact import RunningLaw
 from tests.tick.space import passing_fault
@@ -21,21 +26,20 @@ def pressed(scene: str = "", law: str = "energy-cycle") -> Rig:
     return Rig(scene or ball(), law).start((0.0, 0.0, 0.031)).to((0.0, 0.0, 0.0292), 60)
 
 
-@pytest.mark.parametrize(
-    "after",
-    [
-        ball(stiffness=9000.0),
-        ball(stiffness=1000.0),
-        ball(position_m=(0.0, 0.0, -0.0004)),
-        ball(position_m=(0.003, 0.0, 0.0)),
-        ball(position_m=(0.2, 0.0, 0.0)),
-        ball(radius_m=0.0302),
-        ball(static_friction=0.5, dynamic_friction=0.4),
-        table("ball", "box", size_m=(0.06, 0.06, 0.0598)),
-        "",
-    ],
-    ids=["stiffer", "softer", "lower", "aside", "away", "larger", "rough", "a box", "gone"],
-)
+CHANGED = {
+    "stiffer": ball(stiffness=9000.0),
+    "softer": ball(stiffness=1000.0),
+    "lower": ball(position_m=(0.0, 0.0, -0.0004)),
+    "aside": ball(position_m=(0.003, 0.0, 0.0)),
+    "away": ball(position_m=(0.2, 0.0, 0.0)),
+    "larger": ball(radius_m=0.0302),
+    "rough": ball(static_friction=0.5, dynamic_friction=0.4),
+    "a box": table("ball", "box", size_m=(0.06, 0.06, 0.0598)),
+    "gone": "",
+}
+
+
+@pytest.mark.parametrize("after", CHANGED.values(), ids=CHANGED)
 def test_no_force_jumps_when_an_object_changes(after: str) -> None:
     rig = pressed()
     before = rig.force
@@ -47,9 +51,26 @@ def test_no_force_jumps_when_an_object_changes(after: str) -> None:
         worst = max(worst, apart(rig.force, last))
     assert abs(before[2]) > 3.0
     assert worst <= 2.0 * 12.0 / RAMP_TICKS
-    settled = Rig(after).start((0.0, 0.0, 0.05)).to((0.0, 0.0, 0.0292), 400).to((0.0, 0.0, 0.0292), 100)
+    settled = Rig(after).start((0.0, 0.0, 0.05)).to((0.0, 0.0, 0.0292), 150).to((0.0, 0.0, 0.0292), 60)
     if "position" not in after:  # a proxy that was carried aside has another history than one that came from above
         assert apart(rig.force, settled.force) < 0.02
+    assert rig.unbalanced_j() < 1e-13
+
+
+@pytest.mark.parametrize("after", CHANGED.values(), ids=CHANGED)
+def test_what_was_applied_is_held_until_a_slower_device_has_news_of_the_change(after: str) -> None:
+    """All of it was gone until the next sample."""
+    rig = pressed(ball(static_friction=0.9, dynamic_friction=0.9)).to((0.0005, 0.0, 0.0292), 30)
+    rig.switch(after)
+    for _ in range(3):
+        for _ in range(4):
+            before = tuple(rig.tick.force_n)
+            rig.tick.advance(rig.sample, 1e-3)
+            assert apart(rig.tick.force_n, before) <= 2.0 * 12.0 / RAMP_TICKS
+        x, y, z = rig.tick.force_n
+        rig.force = (x, y, z)
+        rig.go((0.0005, 0.0, 0.0292))
+        assert apart(rig.force, (x, y, z)) <= 5.0 * 2.0 * 12.0 / RAMP_TICKS
     assert rig.unbalanced_j() < 1e-13
 
 
@@ -153,6 +174,28 @@ def test_until_a_switch_is_taken_ticks_tell_of_the_scene_that_is_there(refused: 
     assert (rig.tick.objects, before.index, before.members) == ((1, 0, (0,)) if refused else (2, 1, (1,)))
 
 
+@pytest.mark.parametrize("first", [1, 2, 3])
+@pytest.mark.parametrize("remote", [False, True], ids=["still", "remote"])
+def test_one_that_is_gone_fades_out_on_a_device_that_has_news_every_third_tick(remote: bool, first: int) -> None:
+    """What has faded out is looked at no more, also at a tick without a new sample."""
+    rig = pressed(ball(remote=remote), "none")
+    rig.switch("")
+    forces = [rig.force[2]]
+    for number in range(first + 120):
+        if number < first or (number - first) % 3 == 0:
+            rig.go((0.0, 0.0, 0.0292))
+        else:
+            rig.tick.advance(rig.sample, 1e-3)
+        x, y, z = rig.tick.force_n
+        rig.force = (x, y, z)
+        forces.append(z)
+    assert forces[0] == pytest.approx(4.0)
+    assert max(abs(b - a) for a, b in pairwise(forces)) <= 3.0 * 4.0 / RAMP_TICKS + 1e-9
+    assert forces[-1] == 0.0
+    assert rig.tick.fault == 0
+    assert rig.unbalanced_j() < 1e-13
+
+
 def test_work_of_a_change_is_the_scenes_and_no_leak() -> None:
     rig = pressed(law="none").to((0.0, 0.0, 0.0292), 5)
     generated = rig.totals.ledger.generated_j
@@ -181,6 +224,33 @@ def test_another_law_comes_in_by_a_ramp_on_every_direction() -> None:
     assert len(rig.tick.solids[0].channels) == 3
 
 
+def test_laws_start_from_what_is_measured_when_the_switch_is_taken_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight walls and as many objects take some 30 ticks to make ready, in which the hand goes on."""
+    laws, before = plugins.law("tdpa"), plugins.law("tdpa").start
+    started = []
+
+    def start(state: Any, params: Any, snapshot: LawSnapshot) -> None:
+        started.append((round(snapshot.x_m, 9), round(snapshot.velocity_m_per_s, 6)))
+        before(state, params, snapshot)
+
+    monkeypatch.setattr(laws, "start", start)
+    wall = '[[scene.walls]]\naxis = "z"\nstiffness_n_per_m = 100.0\nposition_m = 0.03\n'
+    far = [ball(f"far {n}", position_m=(0.1 * n, 1.0, 0.0)) for n in range(1, 8)]
+    rig = pressed(ball() + far[0])
+    wanted = config(ball() + far[0] + "".join(far[1:]) + 8 * wall, "tdpa")
+    switching = rig.tick.switch(
+        wanted.config.scene, wanted.config.safety, lambda: RunningLaw(wanted.law, wanted.params)
+    )
+    ticks = 0
+    for ticks, _ in enumerate(switching, 1):
+        rig.go((0.0, 0.0, 0.0292 - 1e-6 * ticks * ticks))
+    assert ticks > 20
+    at_m, speed = rig.tick.motion.position_m[2] - 0.03, round(rig.tick.motion.velocity_m_per_s[2], 6)
+    assert speed < -0.04
+    assert len(started) == 16
+    assert started.count((round(at_m, 9), speed)) == 9, "the ball, and walls as high as it"
+
+
 def test_a_law_that_fails_on_an_object_is_replaced_and_the_force_let_out() -> None:
     rig = pressed()
     loaded = config(ball())
@@ -193,6 +263,23 @@ def test_a_law_that_fails_on_an_object_is_replaced_and_the_force_let_out() -> No
     rig.to((0.0, 0.0, 0.0291), 60)
     assert rig.force == (0.0, 0.0, 0.0)
     assert loaded.law is not contact.normal.law.module
+
+
+def test_what_comes_while_the_fallback_is_in_force_has_it_too_until_the_device_is_armed() -> None:
+    """An object that is new, and the directions of one that has become rough."""
+    rig = pressed()
+    rig.tick.solids[0].normal.law = RunningLaw(passing_fault, passing_fault.Params())
+    rig.go((0.0, 0.0, 0.0291))
+    rig.switch(ball(static_friction=0.5, dynamic_friction=0.4) + ball("other", position_m=(0.2, 0.0, 0.0)))
+    laws = [channel.law for contact in rig.tick.solids for channel in contact.channels]
+    assert len(laws) == 4
+    assert {law.module for law in laws} == {fallback}
+    assert {law.params.damping_n_s_per_m for law in laws} == {INFO.safe_damping_n_s_per_m}
+    rig.to((0.0, 0.0, 0.0291), 60)
+    rig.tick.guard.clear()
+    rig.tick.arm()
+    names = {channel.law.module.__name__ for contact in rig.tick.solids for channel in contact.channels}
+    assert names == {"hapticd_controllers.energy_cycle"}
 
 
 def test_a_turned_normal_makes_a_law_forget_the_mass_of_its_direction() -> None:
@@ -216,6 +303,13 @@ def test_an_object_that_swallows_the_start_is_refused_before_any_force() -> None
     assert str(refused.value) == 'bench: scene.objects[0] "ball": swallows the device, which starts 1 mm inside it'
 
 
+@pytest.mark.parametrize("at", [(0.009, 0.0, 0.0), (0.0, 0.019, 0.0), (0.0, 0.0, -0.029)])
+def test_how_far_inside_it_starts_goes_by_where_the_device_is(at: tuple[float, float, float]) -> None:
+    info = dataclasses.replace(INFO, start_m=at)
+    with pytest.raises(ConfigError, match="starts 1 mm inside it"):
+        Rig(table("box", "box", size_m=(0.02, 0.04, 0.06)), info=info)
+
+
 def test_a_device_with_one_axis_takes_no_object_over() -> None:
     wall = "[[scene.walls]]\nstiffness_n_per_m = 9000.0\n"
     one = dataclasses.replace(INFO, axes=("z",), workspace_m=INFO.workspace_m[:1])
@@ -228,9 +322,11 @@ def test_a_device_with_one_axis_takes_no_object_over() -> None:
 
 def test_what_fades_out_has_no_force_of_its_own_and_is_dropped_when_it_is_gone() -> None:
     """The device goes on inwards at 0.3 m/s: what is left is the old force alone, a share less each tick."""
-    rig = pressed()
-    old_n = rig.force[2]
+    rig = pressed(ball(damping_n_s_per_m=20.0))
+    old_n, stored_j = rig.force[2], rig.totals.ledger.stored_j
     rig.switch("")
+    assert rig.totals.moved_j == pytest.approx(-stored_j)
+    assert rig.totals.ledger.stored_j == 0.0
     assert len(rig.tick.awake) == 1
     for count in range(RAMP_TICKS):
         rig.go((0.0, 0.0, 0.0292 - 3e-4 * (count + 1)))

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hapticd import plugins
+from hapticd.law import LawSnapshot
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
-from hapticd.tick.space.channel import Channel, lay_along
+from hapticd.tick.space.channel import Channel, lay_along, slip_along
 from hapticd_controllers import none
 from tests.tick.rig import law, running
 from tests.tick.space.rig import PERIOD_S, Point, Rig, apart, ball, length, table
@@ -77,6 +80,33 @@ def test_the_three_directions_of_a_rough_surface_stand_across_each_other(normal:
         for other_number, other in enumerate(along):
             across = sum(a * b for a, b in zip(one, other, strict=True))
             assert across == pytest.approx(float(number == other_number), abs=1e-12)
+
+
+def turned(by_deg: float) -> list[Point]:
+    """The directions after the normal has turned towards the first one."""
+    normal, first, _ = CHANNELS
+    cos, sin = math.cos(math.radians(by_deg)), math.sin(math.radians(by_deg))
+    first.dx, first.dy, first.dz = 0.48, 0.6, 0.64
+    normal.dx, normal.dy, normal.dz = 0.8 * cos + 0.48 * sin, 0.6 * sin, 0.64 * sin - 0.6 * cos
+    still = (0.0, 0.0, 0.0)
+    slip_along(CHANNELS, 0, 0.0, still, 0.0, still, still, PERIOD_S)
+    return [(channel.dx, channel.dy, channel.dz) for channel in CHANNELS]
+
+
+@pytest.mark.parametrize(("by_deg", "sign"), [(10.0, 1.0), (55.0, 1.0), (125.0, -1.0)])
+def test_where_a_surface_turns_the_first_direction_stays_as_near_as_it_can(by_deg: float, sign: float) -> None:
+    (a, b, c), (d, e, f), across = turned(by_deg)
+    cos, sin = math.cos(math.radians(by_deg)), math.sin(math.radians(by_deg))
+    nearest = (0.48 * cos - 0.8 * sin, 0.6 * cos, 0.64 * cos + 0.6 * sin)
+    assert (d, e, f) == pytest.approx([sign * each for each in nearest])
+    assert across == pytest.approx((b * f - c * e, c * d - a * f, a * e - b * d))
+
+
+@pytest.mark.parametrize("by_deg", [65.0, 89.0])
+def test_where_the_first_direction_nearly_becomes_the_normal_both_are_laid_anew(by_deg: float) -> None:
+    after = turned(by_deg)
+    lay_along(CHANNELS)
+    assert after == [(channel.dx, channel.dy, channel.dz) for channel in CHANNELS]
 
 
 def test_a_straight_press_has_the_same_books_on_a_rough_surface_and_on_a_smooth_one() -> None:
@@ -165,3 +195,65 @@ def test_a_law_sees_a_surface_as_a_wall_below_nothing_by_the_depth_and_pushing_o
     assert moved_m == pytest.approx(-1e-4)
     assert speed_m_per_s < -0.05
     assert spring_n == pytest.approx(5.0)
+
+
+def test_laws_of_what_comes_begin_at_rest_where_the_device_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    tdpa = plugins.law("tdpa")
+    before, started = tdpa.start, []
+
+    def start(state: Any, params: Any, snapshot: LawSnapshot) -> None:
+        started.append((snapshot.x_m, snapshot.velocity_m_per_s, snapshot.applied_n))
+        before(state, params, snapshot)
+
+    rig = pressed(ball(), "tdpa")
+    monkeypatch.setattr(tdpa, "start", start)
+    rig.switch(ball(**ROUGH))
+    assert started == [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+    started.clear()
+    rig.switch(ball(**ROUGH) + ball("new", position_m=(0.0, 0.001, 0.0), stiffness=100.0))
+    inside_m = 0.03 - length((0.0, 0.001, 0.0292))
+    (comes,) = started  # one that comes about the device
+    assert comes == pytest.approx((-inside_m, 0.0, 0.0))
+
+
+def test_an_object_is_looked_at_from_as_far_as_a_device_of_five_metres_a_second_comes_in_a_tick() -> None:
+    rig = Rig(ball()).start((0.0, 0.0, 0.3)).go((0.0, 0.0, 0.0351))
+    assert rig.tick.awake == []
+    rig.go((0.0, 0.0, 0.0349))
+    (contact,) = rig.tick.awake
+    rig.go((0.0, 0.0, 0.0348), (0.0, 0.0, 0.0351))
+    assert contact.solid.proxy.d == pytest.approx(0.0048)
+
+
+@pytest.mark.parametrize(("before", "after"), [("energy-cycle", "none"), ("none", "energy-cycle")])
+def test_what_a_law_has_learnt_is_for_one_that_learns_it_too(before: str, after: str) -> None:
+    rig = pressed(ball(**ROUGH), before)
+    for channel in rig.tick.solids[0].channels:
+        channel.damping_n_s_per_m = 300.0
+    rig.switch(ball(**ROUGH), law=after)
+    assert [channel.damping_n_s_per_m for channel in rig.tick.solids[0].channels] == [0.0, 0.0, 0.0]
+    other = pressed(ball(**ROUGH), "energy-cycle")
+    other.tick.solids[0].normal.damping_n_s_per_m = 300.0
+    assert other.switch(ball(**ROUGH), law="energy-cycle").tick.solids[0].normal.damping_n_s_per_m == 300.0
+
+
+def test_a_law_that_takes_over_is_shown_what_of_the_contact_was_applied_last() -> None:
+    rig = pressed(ball(**ROUGH)).to((0.0005, 0.0003, 0.0291), 20)
+    before = [channel.tick.applied_contact_n for channel in rig.tick.solids[0].channels]
+    assert min(abs(newton) for newton in before) > 0.5
+    rig.switch(ball(**ROUGH), law="damper")
+    assert [channel.tick.applied_contact_n for channel in rig.tick.solids[0].channels] == before
+    velocity = [channel.velocity_m_per_s for channel in rig.tick.solids[0].channels]
+    assert [channel.tick.velocity_m_per_s for channel in rig.tick.solids[0].channels] == velocity
+    assert max(velocity) > 0.01
+
+
+@pytest.mark.parametrize("keys", [{}, ROUGH], ids=["smooth", "rough"])
+def test_a_pressed_device_that_was_armed_while_blind_comes_in_by_a_ramp(keys: dict[str, Any]) -> None:
+    """As on a wall: the arming falls between the last bad sample and the first good one."""
+    rig = pressed(ball(**keys))
+    rig.go(*[(math.nan, 0.0, 0.0292)] * 20)
+    rig.tick.guard.clear()
+    assert rig.tick.arm()
+    rig.go(*[(0.0, 0.0, 0.0292)] * 51)
+    assert [z for _, _, z in rig.forces[-51:]] == pytest.approx([4.0 * n / 50 for n in range(51)])

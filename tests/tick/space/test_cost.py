@@ -32,7 +32,7 @@ def touching(count: int) -> str:
     return "".join(ball(f"ball {n}", 5000.0 + n, **ROUGH) for n in range(count))
 
 
-def per_tick(scene: str, law: str = "energy-cycle", ticks: int = 63) -> float:
+def per_tick(scene: str, law: str = "energy-cycle", ticks: int = 32) -> float:
     """Instructions of a tick that is pressed, on the mean, step alone: what a tick has besides is the same for all."""
     rig = Rig(scene, law).start((0.0, 0.0, 0.031))
     points = [(1e-4 * math.sin(0.1 * n), 0.0, 0.0295 + 6e-4 * math.cos(0.2 * n)) for n in range(263)]

@@ -97,6 +97,44 @@ def test_a_corner_of_three_faces_holds_both_ways() -> None:
     assert (solid.grip, solid.sides) == (2, 3)
 
 
+@pytest.mark.parametrize("law", ["damper", "ring-damping"])
+def test_out_of_a_corner_along_an_edge_no_law_brakes(law: str) -> None:
+    """It swings in the corner across the edge first, so that what holds it along the edge is the second direction."""
+    at_m = 0.0505
+    rig = Rig(table("room", "box", STIFFNESS, inside=True, size_m=(0.1, 0.1, 0.1)), law)
+    rig.start((0.049, 0.049, 0.049)).to((at_m, at_m, at_m), 40)
+    for n in range(1, 60):
+        a, b = 1e-4 * math.sin(0.3 * n), 1e-4 * math.sin(0.2 * n) if n > 20 else 0.0
+        rig.go((at_m - 2.0 * b, at_m + a + b, at_m - a + b))
+    solid = rig.tick.solids[0]
+    assert solid.grip == 2
+    rig.to((0.05, at_m, at_m), 100)
+    assert solid.grip == 2
+    for n in range(1, 100):
+        across_m = 1e-4 * math.sin(0.3 * n)
+        rig.go((0.05 - 5e-5 * n, at_m + across_m, at_m - across_m))
+        assert solid.grip == 1
+        assert abs(rig.force[0]) < 0.1
+    assert rig.unbalanced_j() < 1e-13
+
+
+def test_where_it_is_rough_the_directions_stay_as_they_are_while_the_proxy_is_pinned() -> None:
+    """Friction has a channel for each way across already."""
+    at_m = 0.0505
+    room = table("room", "box", STIFFNESS, inside=True, size_m=(0.1, 0.1, 0.1))
+    rig = Rig(room + "static_friction = 0.5\ndynamic_friction = 0.4\n", "none")
+    rig.start((0.049, 0.049, 0.049)).to((at_m, at_m, at_m), 40)
+    normal, *_ = rig.tick.solids[0].channels
+    kept = set()
+    for n in range(100):
+        a, b = 2e-4 * math.sin(0.3 * n), 1e-4 * math.sin(0.2 * n)
+        rig.go((at_m + a + b, at_m - a + b, at_m - 2.0 * b))
+        kept.add((round(normal.dx, 9), round(normal.dy, 9), round(normal.dz, 9)))
+    assert len(kept) <= 2
+    assert rig.tick.solids[0].grip == 1
+    assert rig.unbalanced_j() < 1e-13
+
+
 def test_another_scene_in_the_middle_of_a_swing_brings_no_step_of_force() -> None:
     rig = pressed("none")
     rig.go(*swings(33))

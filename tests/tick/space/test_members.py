@@ -67,3 +67,23 @@ def test_a_scene_in_another_order_keeps_their_numbers() -> None:
     rig.switch(ball("new", 3000.0, position_m=(-0.2, 0.0, 0.0)) + SCENE).to((0.0, 0.0, 0.0115), 5)
     one = recorded(rig)
     assert (one.index, one.carrier, one.inside) == (TABLE + 1, BALL + 1, (BALL + 1,))
+
+
+def test_in_the_seam_of_two_the_first_carries_and_on_a_face_the_device_is_in_neither() -> None:
+    floor = table("floor", "box", size_m=(0.125, 0.125, 0.03125), position_m=(0.0, 0.0, -0.015625))
+    wall = table("wall", "box", size_m=(0.03125, 0.125, 0.125), position_m=(-0.015625, 0.0, 0.0))
+    step_m = 0.0009765625  # of numbers that have no rounding
+    for scene in (floor + wall, wall + floor):
+        solid = Rig(scene).start((step_m, step_m, step_m)).to((-step_m, 0.0, -step_m), 2).tick.solids[0].solid
+        assert solid.shares(-step_m, 0.0, -step_m) == (0, 0b11)
+    assert solid.shares(step_m, 0.0, 0.0)[1] == 0
+    assert solid.shares(step_m, 0.0, -1e-9)[1] == 0b10
+
+
+def test_a_reader_looks_anew_at_who_is_who_only_where_one_came_went_or_changed_places() -> None:
+    first, second = ball("first", 4000.0), ball("second", 3000.0, position_m=(0.2, 0.0, 0.0))
+    rig = Rig(first + second)
+    listings = [rig.tick.listing]
+    for scene in (first + second, ball("first", 5000.0) + second, second + first, first, first + second):
+        listings.append(rig.switch(scene).tick.listing)
+    assert listings == [0, 0, 0, 1, 2, 3]
