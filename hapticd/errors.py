@@ -23,6 +23,10 @@ HapticdError                     one line for the user; `exit_code` for the shel
 
 from __future__ import annotations
 
+import re
+from pathlib import PurePath
+from traceback import walk_tb
+
 
 class HapticdError(Exception):
     """Base of all errors that are meant for the user: the message says what, where and what to do."""
@@ -114,3 +118,25 @@ class SchemaError(ClientError):
 
 class WireError(ClientError):
     """A message that is not what the contract says."""
+
+
+def in_words(error: BaseException, module: str) -> str:
+    """What a plug-in raised, and where in it: `ZeroDivisionError: division by zero (mine.py:12)`.
+
+    Args:
+        error: an exception of anybody's making, which need not even be printable.
+        module: name of the plug-in's module.
+    """
+    try:
+        text = f"{type(error).__name__}: {error}".removesuffix(": ")
+    except Exception:  # noqa: BLE001 - its text is made by anybody's code
+        text = type(error).__name__
+    undeclared = re.match(rf"AttributeError: '{re.escape(module)}\.(\w+)' object has no attribute '(\w+)'", text)
+    if undeclared:  # a law's state and parameters have the fields that are declared, and no others
+        text = "{0} has no field {1}: declare it there, `{1}: float`".format(*undeclared.groups())
+    places = [
+        f" ({PurePath(frame.f_code.co_filename).name}:{line})"
+        for frame, line in walk_tb(error.__traceback__)
+        if frame.f_globals.get("__name__") == module
+    ]
+    return text + "".join(places[-1:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import re
@@ -44,6 +45,38 @@ STATE = "state"
 """Name of the socket beside it that tells them of each tick."""
 LOCK = "lock"
 """Name of the file beside them that a daemon holds locked as long as it lives."""
+
+_FILES_ONLY = os.O_NOFOLLOW | os.O_NONBLOCK
+_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ENXIO)  # the last two: a link, a socket
+
+
+def open_lock(path: Path) -> int:
+    """Descriptor of the lock that a daemon holds as long as it lives; made when it is not there.
+
+    Raises:
+        InstanceError: it cannot be had: what lies there is no file, or why the system refuses.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | _FILES_ONLY, 0o644)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENXIO, errno.EISDIR):
+            raise _in_the_way(path) from None
+        raise InstanceError(f"{path}: {why_refused(error.errno)}") from error
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise _in_the_way(path)
+    return descriptor
+
+
+def why_refused(number: int | None) -> str:
+    """Why the system makes nothing in a runtime directory, with what to do where that is known.
+
+    Args:
+        number: of the error.
+    """
+    advice = "; run as the user that owns the directory" if number in (errno.EACCES, errno.EPERM, errno.EROFS) else ""
+    return f"{os.strerror(number or 0)}{advice}"
+
 
 _RUN = Path("/run/hapticd")
 _WHOSE = ("system", "user")
@@ -98,9 +131,11 @@ def alive(directory: Path) -> bool:
         PermissionError: this user may not look.
     """
     try:
-        descriptor = os.open(directory / LOCK, os.O_RDONLY | os.O_CLOEXEC)
-    except (FileNotFoundError, NotADirectoryError):
-        return False
+        descriptor = os.open(directory / LOCK, os.O_RDONLY | os.O_CLOEXEC | _FILES_ONLY)
+    except OSError as error:
+        if error.errno in _NO_FILE:
+            return False
+        raise
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -187,7 +222,7 @@ def living_instances() -> list[str]:
 def _living(place: Path) -> list[Path]:
     try:
         directories = sorted(place.iterdir())
-    except (FileNotFoundError, PermissionError):
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
         return []
     return [directory for directory in directories if _INSTANCE.fullmatch(directory.name) and _may_live(directory)]
 
@@ -208,17 +243,48 @@ def named_directory(kind: Literal["RUNTIME", "STATE"], instance: str) -> Path | 
     """The directory of an instance that the environment names, if it does: $HAPTICD_<kind>_DIR, else systemd's.
 
     Raises:
-        ConfigError: the instance's name is none that a directory could have.
+        ConfigError: the instance's name is none that a directory could have, or that directory's is no UTF-8, as what
+            ZeroMQ binds has to be.
     """
     if _INSTANCE.fullmatch(instance) is None:
         raise ConfigError(f"instance = {instance!r}: letters, digits and _ . - only, at most 32, the first no sign")
-    base = os.environ.get(f"HAPTICD_{kind}_DIR")
+    variable = f"HAPTICD_{kind}_DIR"
+    base = os.environ.get(variable)
     if base:
+        if not _is_utf8(base):
+            raise ConfigError(f"{variable} = {base!r}: must be UTF-8")
         return Path(base) / instance
     unit = os.environ.get(f"{kind}_DIRECTORY", "").split(":")[0]
     if unit:
         return Path(unit) if Path(unit).name == instance else Path(unit) / instance
     return None
+
+
+def home_directory(instead: str) -> Path:
+    """The home directory of this user.
+
+    Args:
+        instead: names of the variables that would do as well, for people.
+
+    Raises:
+        ConfigError: it has none, as in a container that runs it under a number only.
+    """
+    try:
+        return Path.home()
+    except RuntimeError:
+        raise ConfigError(f"user {os.geteuid()} has no home directory: set {instead}") from None
+
+
+def _is_utf8(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _in_the_way(path: Path) -> InstanceError:
+    return InstanceError(f"{path}: what lies there is no file of a daemon; remove it")
 
 
 def _named(instance: str) -> tuple[str, str]:
@@ -284,5 +350,5 @@ def fault_directories(instance: str) -> list[Path]:
 
 
 def _user_state(instance: str) -> Path:
-    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state"
+    home = os.environ.get("XDG_STATE_HOME") or home_directory("HOME or HAPTICD_STATE_DIR") / ".local/state"
     return Path(home) / "hapticd" / instance

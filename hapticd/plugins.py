@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
+import signal
+import threading
+from collections.abc import Iterator
 from importlib.metadata import EntryPoint, entry_points
-from types import ModuleType
-from typing import Any
+from types import FrameType, ModuleType
+from typing import Any, NoReturn
 
 from hapticd.driver import Driver
-from hapticd.errors import PluginError
+from hapticd.errors import PluginError, in_words
 from hapticd.law import check_law
 
 DRIVERS = "hapticd.drivers"
@@ -124,9 +128,12 @@ def _imported(kind: str, name: str, module: str) -> ModuleType:
         PluginError: it cannot be imported; caused by what went wrong.
     """
     try:
-        return importlib.import_module(module)
-    except (Exception, SystemExit) as error:
-        raise PluginError(f"{kind} module {name!r} cannot be imported: {type(error).__name__}: {error}") from error
+        with _interruptible():
+            return importlib.import_module(module)
+    except _Interrupted:
+        raise
+    except BaseException as error:
+        raise PluginError(f"{kind} module {name!r} cannot be imported: {in_words(error, module)}") from error
 
 
 def _find(group: str, name: str) -> EntryPoint | None:
@@ -135,8 +142,35 @@ def _find(group: str, name: str) -> EntryPoint | None:
 
 def _load(point: EntryPoint) -> Any:
     try:
-        return point.load()
-    except (Exception, SystemExit) as error:
-        raise PluginError(
-            f"{point.name} ({point.value}) cannot be imported: {type(error).__name__}: {error}"
-        ) from error
+        with _interruptible():
+            return point.load()
+    except _Interrupted:
+        raise
+    except BaseException as error:
+        said = in_words(error, point.module)
+        raise PluginError(f"{point.name} ({point.value}) cannot be imported: {said}") from error
+
+
+class _Interrupted(KeyboardInterrupt):
+    """Ctrl-C, and not what a plug-in raises by itself."""
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> NoReturn:
+    raise _Interrupted
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[None]:
+    """Have Ctrl-C told apart, where it would be a KeyboardInterrupt: in the main thread, with no handler of another."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield
+        return
+    signal.signal(signal.SIGINT, _interrupt)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGINT) is _interrupt:  # the plug-in may have set one of its own
+            signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -5,16 +5,28 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import resource
+import socket
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from hapticd import paths
 from hapticd.errors import ConfigError, InstanceError
-from hapticd.paths import living_instances, locate, make_runtime_directory, runtime_directory, telemetry_endpoint
+from hapticd.keys.store import key_directory
+from hapticd.paths import (
+    fault_directory,
+    living_instances,
+    locate,
+    make_runtime_directory,
+    named_directory,
+    runtime_directory,
+    telemetry_endpoint,
+)
 from hapticd.supervisor.lock import InstanceLock
 
 
@@ -195,6 +207,79 @@ def test_a_directory_that_cannot_be_made_is_one_line(user: Path, monkeypatch: py
 def test_a_name_that_is_no_directory_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match="instance = "):
         runtime_directory(name)
+
+
+@pytest.mark.parametrize("kind", ["directory", "link", "endless link", "pipe", "socket"])
+def test_what_lies_in_the_place_of_the_lock_is_no_daemon_and_stays_as_it_is(
+    kind: str, user: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pipe let commands wait for ever, links and sockets ended them as a defect; a daemon wrote behind a link."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "lab"))
+    lock, behind = user / "lab" / "left" / "lock", user / "precious"
+    lock.parent.mkdir(parents=True)
+    behind.write_text("diary")
+    with socket.socket(socket.AF_UNIX) as bound:
+        match kind:
+            case "directory":
+                lock.mkdir()
+            case "link":
+                lock.symlink_to(behind)
+            case "endless link":
+                lock.symlink_to(lock)
+            case "pipe":
+                os.mkfifo(lock)
+            case "socket":
+                bound.bind(str(lock))
+        assert living_instances() == []
+        assert locate("control", "left") == lock.parent / "control"
+        with pytest.raises(InstanceError, match="lock: what lies there is no file of a daemon; remove it"):
+            InstanceLock("left")
+    assert behind.read_text() == "diary"
+    assert os.path.lexists(lock)
+
+
+def test_a_daemon_that_cannot_write_its_lock_says_which_file_and_leaves_none(
+    user: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A full disk was said to be the standard output's, in a daemon that prints nothing."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "lab"))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    try:
+        with pytest.raises(InstanceError, match=r"lab/left/lock: File too large$"):
+            InstanceLock("left")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list((user / "lab" / "left").iterdir()) == []
+
+
+def test_a_runtime_directory_that_is_none_has_no_daemons(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (user / "file").touch()
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "file"))
+    assert living_instances() == []
+
+
+@pytest.mark.parametrize("kind", ["RUNTIME", "STATE"])
+def test_a_directory_that_is_no_utf_8_is_refused_by_its_name(
+    kind: Literal["RUNTIME", "STATE"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(f"HAPTICD_{kind}_DIR", "/tmp/lab\udce9")
+    with pytest.raises(ConfigError, match=rf"HAPTICD_{kind}_DIR = '/tmp/lab.udce9': must be UTF-8"):
+        named_directory(kind, "default")
+
+
+@pytest.mark.usefixtures("not_root")
+def test_a_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a container that runs it under a number only, the daemon ended as a defect after the loop had begun."""
+    for name in ("HOME", "XDG_STATE_HOME", "XDG_CONFIG_HOME", "HAPTICD_STATE_DIR", "STATE_DIRECTORY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os, "getuid", lambda: 54321)
+    with pytest.raises(ConfigError, match="user 1000 has no home directory: set HOME or HAPTICD_STATE_DIR"):
+        fault_directory("default")
+    monkeypatch.delenv("HAPTICD_KEYS_DIR", raising=False)
+    monkeypatch.delenv("CONFIGURATION_DIRECTORY", raising=False)
+    with pytest.raises(ConfigError, match="set HOME or HAPTICD_KEYS_DIR"):
+        key_directory()
 
 
 def test_a_directory_that_the_environment_names_and_that_is_closed_is_named(

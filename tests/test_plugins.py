@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -88,6 +89,9 @@ def test_a_module_that_is_not_there_is_an_error_of_the_users(elsewhere: Path, na
     [
         ("1 / 0", "cannot be imported: ZeroDivisionError"),
         ("def broken(:", "cannot be imported: SyntaxError"),
+        ("\nraise SystemExit(3)", r"cannot be imported: SystemExit: 3 \(law\.py:2\)"),
+        ("raise KeyboardInterrupt", r"cannot be imported: KeyboardInterrupt \(law\.py:1\)"),
+        (GOOD_LAW + "\nState.__annotations__['x'] = 'exit(3)'", "State make no sense: 3"),
         (GOOD_LAW.replace("def step", "def stop"), "has no `step`"),
         (GOOD_LAW.replace("params, snapshot", "params"), r"start must take \(state, params, snapshot\)"),
         (GOOD_LAW.replace("def step(", "step = 3\ndef stop("), r"step must take \(state, params, tick\)"),
@@ -99,6 +103,16 @@ def test_a_module_that_is_no_law_is_refused_with_what_it_lacks(elsewhere: Path, 
     (elsewhere / "law.py").write_text(source)
     with pytest.raises(PluginError, match=said):
         plugins.law("lab.law")
+
+
+@pytest.mark.parametrize("own", ["", "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"])
+def test_what_ctrl_c_does_afterwards_is_as_it_was_or_as_the_module_wants_it(elsewhere: Path, own: str) -> None:
+    (elsewhere / "law.py").write_text(own + GOOD_LAW)
+    try:
+        plugins.law("lab.law")
+        assert signal.getsignal(signal.SIGINT) is (signal.SIG_IGN if own else signal.default_int_handler)
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.mark.parametrize("name", ["lab.rig", "lab.rig.MyRig"])

@@ -13,6 +13,7 @@ from typing import Final
 import typer
 
 from hapticd.cli.group import EXIT_MISUSED, Overview
+from hapticd.errors import in_words
 from hapticd.version import __version__
 
 COMMANDS: Final = {
@@ -95,8 +96,8 @@ def _list_installed(app: typer.Typer, point: EntryPoint) -> None:
     """List a command of another distribution; one that cannot be imported spoils no overview."""
     try:
         _add_installed(app, point)
-    except Exception as error:  # noqa: BLE001 - a plug-in is anybody's code
-        app.command(point.name, help=f"Cannot be used: {type(error).__name__}: {error}")(_listed)
+    except BaseException as error:  # noqa: BLE001 - a plug-in is anybody's code
+        app.command(point.name, help=f"Cannot be used: {in_words(error, point.module)}")(_listed)
 
 
 def _overview(

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from hapticd.config.loading import LoadedConfig, load
-from hapticd.errors import ConfigError
+from hapticd.errors import ConfigError, DriverError
 from hapticd.keys.policy import key_ring
 from hapticd.offline.model_choice import fit
 from hapticd.offline.rehearsal import Rehearsal
@@ -62,7 +62,7 @@ def _put_together(loaded: LoadedConfig) -> None:
     """Make the tick on a simulated device; a real one says only when it is open what axes and limits it has.
 
     Raises:
-        ConfigError: the scene or the limits do not fit the device.
+        ConfigError: the scene or the limits do not fit the device, or its driver fails.
     """
     options = loaded.options
     if (
@@ -70,4 +70,7 @@ def _put_together(loaded: LoadedConfig) -> None:
         and issubclass(loaded.driver, SimulatedDriver)
         and options.clock == "ticks"
     ):
-        Rehearsal(loaded)
+        try:
+            Rehearsal(loaded)
+        except DriverError as error:
+            raise ConfigError(f"{loaded.path}: {error}") from error

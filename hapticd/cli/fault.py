@@ -158,7 +158,7 @@ def _find(name: str | None, instance: str, directory: Path | None) -> Path:
 def _lines(record: FaultRecord, summary: FaultSummary) -> list[str]:
     header = record.header
     event = header["event"]
-    when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(event["timestamp"]))
+    when = time.strftime("%Y-%m-%d %H:%M:%S %z", time.localtime(event["timestamp"]))
     gone = f"gone after {summary.ramp_ticks} ticks" if summary.ramp_ticks is not None else "not gone in this record"
     if not summary.after_s:
         gone = "no ticks after the fault"

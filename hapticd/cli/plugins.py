@@ -105,7 +105,7 @@ def show_plugins(described: list[Plugin], table_name: str, as_json: bool) -> Non
             table = Table(title=escape(f"[{table_name}]"), title_justify="left", box=None, pad_edge=True, expand=False)
             table.add_column("key", no_wrap=True)
             table.add_column("default", overflow="fold")
-            table.add_column("meaning")
+            table.add_column("meaning", overflow="fold")
             branch = ""
             for parameter in plugin.parameters:
                 if parameter.only_with not in ("", branch):

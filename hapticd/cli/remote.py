@@ -13,7 +13,7 @@ import typer
 
 from hapticd.cli.completion import instances
 from hapticd.client import commands
-from hapticd.client.commands import command
+from hapticd.client.commands import RefusedError, command
 from hapticd.errors import InstanceError
 from hapticd.paths import CONTROL, DEFAULT_INSTANCE, alive, locate
 
@@ -135,7 +135,9 @@ def calibrate(
 
     Example: hapticd calibrate --countdown 10
     """
-    command("status", instance, connect=connect, keys=keys)  # first: is there a daemon?
+    # First: is there a daemon, and will it? A countdown says that the arm will move.
+    if command("status", instance, connect=connect, keys=keys)["status"]["armed"]:
+        raise RefusedError("calibration moves the arm by itself: `hapticd disarm` first")
     for left_s in range(countdown_s, 0, -1):
         typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
         time.sleep(1.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from logging.handlers import QueueHandler, QueueListener
+import os
+import signal
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Annotated
@@ -11,6 +12,7 @@ from typing import Annotated
 import typer
 
 from hapticd.config.loading import load
+from hapticd.errors import HapticdError
 from hapticd.paths import DEFAULT_INSTANCE, default_config
 
 
@@ -35,14 +37,22 @@ def run(
 
         raise typer.Exit(run_watched(path, instance))
     from hapticd.supervisor.daemon import Daemon
+    from hapticd.supervisor.log_queue import LogQueue, LogWriter
     from hapticd.supervisor.systemd import log_handler
 
     # Written by a thread: a terminal that is stopped (Ctrl-S) or cut off must not stop the supervisor.
-    lines: SimpleQueue[logging.LogRecord] = SimpleQueue()
-    writer = QueueListener(lines, log_handler())
-    logging.basicConfig(level=logging.INFO, format="%(message)s", handlers=[QueueHandler(lines)])
+    lines: SimpleQueue[logging.LogRecord | None] = SimpleQueue()
+    writer = LogWriter(lines, log_handler())
+    logging.basicConfig(level=logging.INFO, format="%(message)s", handlers=[LogQueue(lines)])
     writer.start()
+    code = 1
     try:
-        raise typer.Exit(Daemon(loaded, instance).run())
+        code = Daemon(loaded, instance).run()
+    except HapticdError as error:
+        code = error.exit_code
+        raise
     finally:
-        writer.stop()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # another one would lose the lines that say how it went
+        if not writer.end():  # then nor could the interpreter
+            os._exit(code)
+    raise typer.Exit(code)

@@ -13,7 +13,7 @@ from hapticd.cli.completion import instances
 from hapticd.client.commands import command
 from hapticd.errors import InstanceError
 from hapticd.paths import living_instances
-from hapticd.telemetry.records import late_ticks
+from hapticd.telemetry.records import Status, late_ticks
 
 SCHEMA = 1
 """Version of what `--json` prints."""
@@ -49,42 +49,43 @@ def _asked(name: str) -> dict[str, Any]:
         status: dict[str, Any] = command("status", name)["status"]
     except InstanceError as error:
         return {"name": name, "problem": str(error)}
-    histogram = status["late_histogram"]
+    histogram = Status.of(status).late_histogram
     return {"name": name, "late_share": late_ticks(histogram) / (sum(histogram) or 1), "status": status}
 
 
 def _lines(one: Mapping[str, Any]) -> list[str]:
     if "problem" in one:
         return [f"{one['name']}: {one['problem']}"]
-    status = one["status"]
-    mode = "stopped by a fault" if status["latched"] else "armed" if status["armed"] else "disarmed"
-    if status["device_lost_timestamp"]:
+    status = Status.of(one["status"])
+    mode = "stopped by a fault" if status.latched else "armed" if status.armed else "disarmed"
+    if status.device_lost_timestamp:
         mode = "no device"
-    rate_hz = status["measured_rate_hz"]
+    rate_hz = status.measured_rate_hz
     parts = (
         mode,
-        f"law {status['law']}" + (" (failed, damping instead)" if status["fallback"] else ""),
-        f"{f'{rate_hz:.0f}' if rate_hz else '?'} of {status['rate_hz']:g} Hz",
+        f"law {status.law}" + (" (failed, damping instead)" if status.fallback else ""),
+        f"{f'{rate_hz:.0f}' if rate_hz else '?'} of {status.rate_hz:g} Hz",
         f"{100.0 * one['late_share']:.2g} % late",
     )
-    device = status["device"] + (", simulated" if status["simulated"] else "")
-    lines = [f"{one['name']}: {', '.join(parts)}", f"  {device}, since {_shown(status['started_timestamp'])}"]
-    if status["fault_code"]:
-        lines.append(f"  fault {status['fault_code']} at {_shown(status['fault_timestamp'])}: {status['fault_text']}")
-    if status["latched"]:
+    device = status.device + (", simulated" if status.simulated else "")
+    since = f", since {_shown(status.started_timestamp)}" if status.started_timestamp else ""
+    lines = [f"{one['name']}: {', '.join(parts)}", f"  {device}{since}"]
+    if status.fault_code:
+        lines.append(f"  fault {status.fault_code} at {_shown(status.fault_timestamp)}: {status.fault_text}")
+    if status.latched:
         lines.append("  no force until `hapticd clear`, then `hapticd arm`")
     lines.extend(_driven(status))
-    lines.extend(f"  {warning}" for warning in status["warnings"])
+    lines.extend(f"  {warning}" for warning in status.warnings)
     return lines
 
 
-def _driven(status: Mapping[str, Any]) -> Iterator[str]:
+def _driven(status: Status) -> Iterator[str]:
     """A line for each thing that clients may drive."""
-    counted = ("remote_name", "remote_kind", "remote_owner", "remote_messages", "remote_refused")
-    for name, kind, owner, messages, refused in zip(*(status.get(key, ()) for key in counted), strict=True):
+    counted = (status.remote_kind, status.remote_owner, status.remote_messages, status.remote_refused)
+    for name, kind, owner, messages, refused in zip(status.remote_name, *counted, strict=True):
         whose = f"driven by {owner}" if owner else "no client"
         yield f"  {kind} {name}: {whose}, {messages} messages, {refused} refused"
 
 
 def _shown(timestamp: float) -> str:
-    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(timestamp))
+    return time.strftime("%Y-%m-%d %H:%M:%S %z", time.localtime(timestamp))

@@ -18,8 +18,8 @@ from hapticd.config.editing import with_law
 from hapticd.config.file import read, replace
 from hapticd.config.plugin_tables import ControllerConfig
 from hapticd.config.problems import shown_value
-from hapticd.errors import ConfigError, InstanceError
-from hapticd.paths import CONTROL, DEFAULT_INSTANCE, SYSTEM_CONFIG, locate
+from hapticd.errors import ConfigError
+from hapticd.paths import CONTROL, DEFAULT_INSTANCE, SYSTEM_CONFIG, alive, locate
 
 
 def switch(
@@ -81,13 +81,14 @@ def _parameter(setting: str) -> tuple[str, Any]:
 
 
 def _running_file(instance: str) -> Path | None:
-    """The file that a running daemon has in force; None while none runs."""
-    if not locate(CONTROL, instance).exists():
+    """The file that a running daemon has in force; None while none runs.
+
+    Raises:
+        InstanceError: one runs and does not answer, so that it is not known.
+    """
+    if not alive(locate(CONTROL, instance).parent):
         return None
-    try:
-        return Path(command("status", instance)["status"]["config_file"])
-    except InstanceError:
-        return None
+    return Path(command("status", instance)["status"]["config_file"])
 
 
 def _same(path: Path, other: Path) -> bool:

@@ -17,6 +17,7 @@ from hapticd.config.values import put
 from hapticd.errors import ConfigError
 
 _BOM = "\ufeff"
+_UNIX_END = re.compile(r"(?<!\r)\n")
 
 
 def with_law(text: str, name: str, law: str, params: dict[str, Any]) -> str:
@@ -62,7 +63,7 @@ def with_law(text: str, name: str, law: str, params: dict[str, Any]) -> str:
     found["controller"].setdefault("params", {})
     if found != data:
         raise _by_hand(name)
-    return mark + edited
+    return mark + _ended_as(text, edited)
 
 
 def with_edits(text: str, name: str, values: Mapping[str, Any]) -> str:
@@ -97,7 +98,7 @@ def with_edits(text: str, name: str, values: Mapping[str, Any]) -> str:
     edited = tomlkit.dumps(document)
     try:
         if tomllib.loads(edited) == data:
-            return mark + edited
+            return mark + _ended_as(text, edited)
     except ValueError:
         pass
     raise _by_hand(name, ", ".join(values))
@@ -129,6 +130,12 @@ def _set(data: Any, key: str, value: Any, name: str) -> None:
     put(data, key, value, name)
     for item in tail:
         table.add(item)
+
+
+def _ended_as(text: str, edited: str) -> str:
+    """New lines end as all others of the file do."""
+    dos = "\r\n" in text and not _UNIX_END.search(text)
+    return _UNIX_END.sub("\r\n", edited) if dos else edited
 
 
 def _by_hand(name: str, what: str = "[controller]") -> ConfigError:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -18,8 +19,8 @@ from hapticd.config.objects import MeshObject
 from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig, RemoteLawTable
 from hapticd.config.problems import Problems, nearest
 from hapticd.config.values import with_values
-from hapticd.driver import Driver, DriverOptions
-from hapticd.errors import ConfigError, PluginError
+from hapticd.driver import Driver, DriverOptions, naming
+from hapticd.errors import ConfigError, PluginError, in_words
 from hapticd.law import LawParams, scalar_params
 from hapticd.settings import Table
 
@@ -30,6 +31,11 @@ _MAKE_IMPORTABLE = (
     "; install its package where hapticd is installed, or put its directory on PYTHONPATH"
     " (the configuration's directory is not searched)"
 )
+
+
+_WHOLE_NUMBER = "a whole number of TOML has 64 bits"
+_DEEPEST = 50  # tables in tables; what can be used has less than ten
+_TAKEN = re.compile(r"Cannot (?:declare|redefine namespace|mutate immutable namespace) (\(.*\))(?: twice)?")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -69,6 +75,15 @@ class LoadedConfig:
     def hash(self) -> str:
         """The first 12 digits of `sha256`: what status messages carry."""
         return self.sha256[:12]
+
+    def make_driver(self) -> Driver[Any]:
+        """The driver with its options, not open.
+
+        Raises:
+            DriverError: it cannot be made.
+        """
+        with naming(self.driver, "__init__"):
+            return self.driver(self.options, self.config.loop.period_s)
 
     def with_values(self, values: Mapping[str, Any]) -> LoadedConfig:
         """This configuration with other values, checked as a file is; the name stays, comments of the text are lost.
@@ -115,6 +130,10 @@ def parse(text: str, name: str, folder: Path | None = None) -> LoadedConfig:
     """
     data = _toml(text, name)
     problems = Problems(name)
+    for key, number in _too_large(data, (), name):
+        problems.add(key, _WHOLE_NUMBER, number)
+    if problems.lines:
+        raise ConfigError(*problems.lines)
     config = problems.validated(Config, data)
     driver, options = _driver(problems, data)
     law, params = _law(problems, data, "controller", ControllerConfig().law)
@@ -126,12 +145,14 @@ def parse(text: str, name: str, folder: Path | None = None) -> LoadedConfig:
                 driver.check(options, config.loop.period_s)
             except ValueError as error:
                 problems.add(("device", "options"), str(error))
+            except BaseException as error:  # noqa: BLE001 - a plug-in is anybody's code
+                problems.add(("device", "options"), f"cannot be checked: {in_words(error, driver.__module__)}")
     if problems.lines or config is None or driver is None or options is None:
         raise ConfigError(*problems.lines)
     if law is None or params is None or port_law is None or port_params is None:
         raise ConfigError(*problems.lines)
     folder = Path(name).parent if folder is None else folder
-    files = _with_files(config, folder)
+    files = _with_files(problems, config, folder)
     return LoadedConfig(files, driver, options, law, params, port_law, port_params, Path(name), text, folder)
 
 
@@ -139,15 +160,32 @@ def _toml(text: str, name: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text.removeprefix("\ufeff") + "\n")
     except RecursionError:
-        raise ConfigError(f"{name}: arrays or tables are nested too deeply") from None
-    except ValueError as error:  # TOMLDecodeError, and what tomllib lets through, such as a number of 5000 digits
+        raise _too_deep(name) from None
+    except ValueError as error:  # TOMLDecodeError, and what tomllib lets through: a number of more than 4300 digits
         found = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", str(error), re.DOTALL)
         if found is None:
-            raise ConfigError(f"{name}: not TOML: {error}") from None
+            reason = _WHOLE_NUMBER if "digits" in str(error) else str(error)
+            raise ConfigError(f"{name}: not TOML: {reason}") from None
         reason, line, column = found.groups()
         reason = reason.replace("Cannot overwrite a value", "this key is set twice")
+        reason = _TAKEN.sub(lambda keys: ".".join(ast.literal_eval(keys[1])) + " is there already", reason)
         where = f"line {line}, column {column}" if line else "end of the file"
         raise ConfigError(f"{name}: {where}: not TOML: {reason[:1].lower()}{reason[1:]}") from None
+
+
+def _too_deep(name: str) -> ConfigError:
+    return ConfigError(f"{name}: arrays or tables are nested too deeply")
+
+
+def _too_large(value: object, at: tuple[str | int, ...], name: str) -> Iterator[tuple[tuple[str | int, ...], int]]:
+    """The whole numbers that tomllib takes and TOML does not have: no other process can be told of them."""
+    if len(at) > _DEEPEST:  # a key of many parts, which tomllib takes at any depth and nothing behind it does
+        raise _too_deep(name)
+    if isinstance(value, dict | list):
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _too_large(inner, (*at, key), name)
+    elif isinstance(value, int) and not -(1 << 63) <= value < 1 << 63:
+        yield at, value
 
 
 def _driver(problems: Problems, data: dict[str, Any]) -> tuple[type[Driver[Any]] | None, DriverOptions | None]:
@@ -186,8 +224,8 @@ def _law(
 def _checked(problems: Problems, model: type[TableT], data: object, at: tuple[str, str]) -> TableT | None:
     try:
         return problems.validated(model, data, at)
-    except Exception as error:  # noqa: BLE001 - a plug-in's own validators may raise anything
-        problems.add(at, f"cannot be checked: {type(error).__name__}: {error}")
+    except BaseException as error:  # noqa: BLE001 - a plug-in's own validators may raise anything
+        problems.add(at, f"cannot be checked: {in_words(error, model.__module__)}")
         return None
 
 
@@ -219,15 +257,31 @@ def _plugin(
         return None
 
 
-def _with_files(config: Config, folder: Path) -> Config:
-    """The same with the whole path of each file of the scene, which lies beside the configuration."""
+def _with_files(problems: Problems, config: Config, folder: Path) -> Config:
+    """The same with the whole path of each file of the scene, which lies beside the configuration.
+
+    Raises:
+        ConfigError: a path that is none, or that no other process can be told.
+    """
     if not any(isinstance(each, MeshObject) for each in config.scene.objects):
         return config
-    objects = tuple(
-        each.model_copy(update={"file": str((folder / each.file).resolve())}) if isinstance(each, MeshObject) else each
-        for each in config.scene.objects
-    )
-    return config.model_copy(update={"scene": config.scene.model_copy(update={"objects": objects})})
+    objects = [*config.scene.objects]
+    for index, each in enumerate(objects):
+        if isinstance(each, MeshObject):
+            try:
+                path = str((folder / each.file).resolve())
+                path.encode()
+            except UnicodeEncodeError:
+                problems.add(
+                    ("scene", "objects", index, "file"), "lies in a directory whose name is no UTF-8", each.file
+                )
+            except (OSError, ValueError) as error:
+                problems.add(("scene", "objects", index, "file"), f"is no path: {error}", each.file)
+            else:
+                objects[index] = each.model_copy(update={"file": path})
+    if problems.lines:
+        raise ConfigError(*problems.lines)
+    return config.model_copy(update={"scene": config.scene.model_copy(update={"objects": tuple(objects)})})
 
 
 def _check_together(problems: Problems, config: Config) -> None:

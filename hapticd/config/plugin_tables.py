@@ -33,11 +33,15 @@ class ControllerConfig(Table):
     params: dict[str, Any] = Field(default_factory=dict, description="the law's own parameters")
 
 
+PORT_LAW = "late-cycle"
+"""The law of couplings and forces unless another is named."""
+
+
 class RemoteLawTable(Table):
     """What [remote] says of the law that couplings and forces are under."""
 
     law: str = Field(
-        "late-cycle",
+        PORT_LAW,
         min_length=1,
         description="law of couplings and forces, installed or an importable module: what is late makes energy, which "
         "that of [controller] need not look at (docs/couplings.md)",

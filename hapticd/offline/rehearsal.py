@@ -73,7 +73,7 @@ class Rehearsal:
         self.period_s = loaded.config.loop.period_s
         self.fault: str | None = None
         self.diverged = False
-        driver = loaded.driver(wanted, self.period_s)
+        driver = loaded.make_driver()
         assert isinstance(driver, SimulatedDriver)
         if make_device is not None:
             driver.make_model = make_device

@@ -16,8 +16,9 @@ import pytest
 import typer
 
 from hapticd import __version__
-from hapticd.cli import main
+from hapticd.cli import main, remote
 from hapticd.cli.app import COMMANDS, GROUP, application
+from hapticd.client import RefusedError
 from hapticd.errors import DeviceNotFoundError
 from hapticd.paths import directory
 
@@ -189,6 +190,14 @@ def test_nobody_clears_a_workspace_for_a_daemon_that_is_not_there(tmp_path: Path
     assert done.stderr.startswith("hapticd: no daemon answers on ")
 
 
+def test_nor_for_one_that_is_armed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """It counted down to an arm that would move by itself, and was then refused."""
+    monkeypatch.setattr(remote, "command", lambda *_, **__: {"status": {"armed": True}})
+    with pytest.raises(RefusedError, match="`hapticd disarm` first"):
+        remote.calibrate(countdown_s=1)
+    assert capsys.readouterr().err == ""
+
+
 def test_an_interrupt_ends_with_130(tmp_path: Path) -> None:
     fifo = tmp_path / "never.toml"
     os.mkfifo(fifo)
@@ -221,6 +230,88 @@ def test_check_prints_a_line_for_each_good_file_and_every_problem_of_the_others(
         [str(bad), 'controller.law = "tdap"'],
         [str(bad.parent / "absent.toml"), "no such file"],
     ]
+
+
+OWN = """import sys
+from pydantic import field_validator
+from hapticd.driver import Field
+from hapticd.simulation.options import SimulationOptions
+from hapticd_drivers.loopback import Loopback
+class Options(SimulationOptions):
+    fails: str
+    @field_validator("fails")
+    def leave(cls, fails):
+        if fails == "options":
+            raise SystemExit(0)
+        return fails
+class Own(Loopback):
+    Options = Options
+    def __init__(self, options, period_s):
+        if options.fails == "__init__":
+            sys.exit(0)
+        super().__init__(options, period_s)
+    @classmethod
+    def check(cls, options, period_s):
+        if options.fails == "check":
+            raise KeyboardInterrupt
+    def _open(self):
+        return {}["port"]
+DRIVER = Own
+"""
+
+
+def test_what_plug_ins_do_to_a_check_is_a_line_of_their_file_and_the_other_files_are_checked(tmp_path: Path) -> None:
+    """A module that exits ended it without a word."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/__init__.py").touch()
+    (tmp_path / "lab/own.py").write_text(OWN)
+    files = []
+    for failing in ("options", "check", "__init__", "_open"):
+        files.append(tmp_path / f"{failing}.toml")
+        files[-1].write_text(f'[device]\ndriver = "lab.own"\n[device.options]\nfails = "{failing}"\n')
+    for kind, failing in (("device", "driver"), ("controller", "law")):
+        (tmp_path / f"lab/{failing}.py").write_text("import sys\nsys.exit(0)\n")
+        files.append(tmp_path / f"{failing}.toml")
+        files[-1].write_text(f'[{kind}]\n{failing} = "lab.{failing}"\n')
+    done = hapticd("check", *files, GOOD, PYTHONPATH=str(tmp_path))
+    assert done.returncode == 2
+    assert done.stdout.startswith(f"{GOOD}: ok, ")
+    said = [line.removeprefix(f"{tmp_path}/") for line in done.stderr.splitlines()]
+    assert said == [
+        "options.toml: device.options: cannot be checked: SystemExit: 0 (own.py:11)",
+        "check.toml: device.options: cannot be checked: KeyboardInterrupt (own.py:22)",
+        "__init__.toml: driver lab.own.Own: __init__: SystemExit: 0 (own.py:17)",
+        "_open.toml: driver lab.own.Own: _open: KeyError: 'port' (own.py:24)",
+        "driver.toml: device.driver = \"lab.driver\": driver module 'lab.driver' cannot be imported: SystemExit: 0"
+        " (driver.py:2)",
+        "law.toml: controller.law = \"lab.law\": law module 'lab.law' cannot be imported: SystemExit: 0 (law.py:2)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("command", "kind"), [(["check"], "law"), (["run", "--config"], "driver")], ids=["check", "run"]
+)
+def test_a_users_ctrl_c_while_a_plug_in_is_imported_is_no_fault_of_the_plug_in(
+    command: list[str], kind: str, tmp_path: Path
+) -> None:
+    """It was reported as the module's own KeyboardInterrupt, with exit code 2."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/__init__.py").touch()
+    (tmp_path / "lab/slow.py").write_text("import time\nprint('importing', flush=True)\ntime.sleep(60.0)\n")
+    file = tmp_path / "slow.toml"
+    file.write_text(f'[{"device" if kind == "driver" else "controller"}]\n{kind} = "lab.slow"\n')
+    with subprocess.Popen(
+        [HAPTICD, *command, file],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as asked:
+        assert asked.stdout
+        assert asked.stdout.readline() == "importing\n"
+        asked.send_signal(signal.SIGINT)
+        _, said = asked.communicate()
+    assert (asked.returncode, said) == (130, "")
 
 
 def test_check_as_json_says_the_same(bad: Path) -> None:
@@ -296,8 +387,10 @@ def test_controllers_lists_laws_for_people() -> None:
     assert "tdpa  Time-domain passivity control." in shown
     assert "damping_cap_n_s_per_m" in shown
     assert '"spring" | "total"' in shown
-    only = hapticd("controllers", "none").stdout
+    only = hapticd("controllers", "energy-cycle", COLUMNS="40").stdout
     assert "tdpa" not in only
+    assert "minimum" in "".join(only.split()), "a word that is longer than its column is broken and not cut off"
+    assert "…" not in only
 
 
 def test_a_plugin_that_cannot_be_imported_is_listed_with_the_reason(tmp_path: Path) -> None:

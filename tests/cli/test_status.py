@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
 import os
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
+
+import msgpack
+import zmq
 
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, wait_until
 
@@ -15,6 +21,14 @@ from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, wait_until
 def status(runtime: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(runtime)}
     return subprocess.run([HAPTICD, "status", *arguments], env=environment, capture_output=True, text=True, check=False)
+
+
+@contextlib.contextmanager
+def locked(directory: Path) -> Iterator[None]:
+    """As a daemon holds its lock."""
+    with (directory / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def test_every_daemon_that_lives_is_shown_and_what_a_killed_one_left_is_not(tmp_path: Path) -> None:
@@ -48,6 +62,26 @@ def test_every_daemon_that_lives_is_shown_and_what_a_killed_one_left_is_not(tmp_
                 assert left.wait(PATIENCE_S) == 0
             finally:
                 left.send_signal(signal.SIGTERM)
+
+
+def test_a_daemon_of_the_release_before_that_went_on_through_an_upgrade_is_shown(tmp_path: Path) -> None:
+    """What its status does not have yet ended the command as a defect, with all other daemons unseen."""
+    said = {"schema": 1, "version": "0.2.0", "armed": True, "latched": False, "law": "energy-cycle", "device": "omega7"}
+    said |= {"rate_hz": 1000.0, "late_histogram": [9, 1], "fault_code": 0, "fallback": False, "simulated": True}
+    said |= {"started_timestamp": 1.7e9}
+    (tmp_path / "old").mkdir()
+    with locked(tmp_path / "old"), zmq.Context() as context, context.socket(zmq.ROUTER) as old:
+        old.bind(f"ipc://{tmp_path}/old/control")
+        command = [HAPTICD, "status"]
+        environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(tmp_path), "TZ": "XYZ-5:30"}
+        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as asked:
+            identity, _ = old.recv_multipart()
+            old.send_multipart((identity, msgpack.packb({"ok": True, "text": "", "status": said})))
+            shown, _ = asked.communicate()
+    assert shown.splitlines() == [
+        "old: armed, law energy-cycle, ? of 1000 Hz, 0 % late",
+        "  omega7, simulated, since 2023-11-15 03:43:20 +0530",
+    ]
 
 
 def test_without_a_daemon_it_says_how_to_start_one(tmp_path: Path) -> None:

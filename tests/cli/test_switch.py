@@ -9,6 +9,11 @@ from pathlib import Path
 
 import pytest
 
+import hapticd.cli.switch as cli_switch
+from hapticd.cli import main
+from hapticd.errors import InstanceError
+from hapticd.supervisor.lock import InstanceLock
+
 HAPTICD = Path(sys.executable).with_name("hapticd")
 TEXT = """\
 # our rig
@@ -93,3 +98,22 @@ def test_a_file_must_be_there(file: Path) -> None:
     file.unlink()
     done = switch(file, "none")
     assert (done.returncode, done.stderr) == (2, f"hapticd: {file}: no such file\n")
+
+
+def test_of_a_daemon_that_does_not_answer_it_is_not_said_that_none_runs(
+    file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file was edited, and said to count from the next start on; it did so from the next reload on."""
+
+    def silent(*_: object, **__: object) -> None:
+        raise InstanceError("a daemon runs there and does not answer")
+
+    monkeypatch.setattr(cli_switch, "command", silent)
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(file.parent / "run"))
+    lock = InstanceLock("default")
+    with pytest.raises(SystemExit) as ended:
+        main(["switch", "tdpa", "--config", str(file)])
+    lock.close()
+    assert ended.value.code == 1
+    assert "does not answer" in capsys.readouterr().err
+    assert file.read_text() == TEXT

@@ -265,7 +265,13 @@ def plain(feed: Feed, *arguments: str, until: Callable[[str], bool], **environme
 
 
 def test_without_a_terminal_it_prints_a_line_a_second(feed: Feed) -> None:
-    lines = plain(feed, until=lambda printed: "\n" in printed).splitlines()
+    def until(printed: str) -> bool:
+        feed.paused = "armed" in printed
+        return "waiting for a daemon" in printed
+
+    lines = plain(feed, until=until).splitlines()
+    armed = [line for line in lines if "armed" in line]
+    assert len(set(armed)) == len(armed), "what a daemon said that is silent is not said again"
     assert "\x1b" not in lines[0]
     assert "armed     energy-cycle  999.8 Hz  late 7  skipped 3  z " in lines[0]
     assert lines[0].count(" mm ") == 1

@@ -218,3 +218,16 @@ def test_however_it_is_written_the_values_are_in_it_afterwards(text: str) -> Non
 def test_a_text_that_is_no_toml_is_named() -> None:
     with pytest.raises(ConfigError, match=r"lab\.toml: line 1"):
         with_edits("[safety\n", "lab.toml", {"safety.ramp_s": 0.2})
+
+
+def test_lines_that_are_new_end_as_the_others_do() -> None:
+    """A file from an editor on Windows had two kinds of lines after a switch."""
+    text = '[controller]\r\nlaw = "none"\r\n'
+    for edited in (
+        with_law(text, "lab.toml", "tdpa", {"damping_cap_n_s_per_m": 20.0}),
+        with_edits(text, "lab.toml", {"safety.max_force_n": 5.0}),
+    ):
+        assert edited.count("\n") == edited.count("\r\n") > 2
+        parse(edited, "lab.toml")
+    mixed = text + "# here and there\n"
+    assert with_law(mixed, "lab.toml", "tdpa", {}).endswith("there\n")

@@ -55,6 +55,28 @@ def test_the_text_and_path_give_the_same_configuration_in_another_process() -> N
     assert again == loaded
 
 
+def test_a_whole_number_beyond_64_bits_is_refused_wherever_it_stands() -> None:
+    """A law's parameter had no bound of its own: the daemon ran, and the reload that brought such a number ended it."""
+    text = f"[device.options]\nchanges = [{{ at_s = {1 << 63} }}]\n[controller.params]\nseed = {-(1 << 63) - 1}\n"
+    with pytest.raises(ConfigError) as refused:
+        parse(text, "lab.toml")
+    assert refused.value.problems == (
+        "lab.toml: device.options.changes[0].at_s = 9223372036854775808: a whole number of TOML has 64 bits",
+        "lab.toml: controller.params.seed = -9223372036854775809: a whole number of TOML has 64 bits",
+    )
+
+
+@pytest.mark.parametrize(
+    ("folder", "file", "reason"),
+    [("lab\udce9", "ring.field", "no UTF-8"), ("lab", "ring\\u0000.field", "is no path")],
+)
+def test_a_mesh_that_lies_where_no_other_process_can_be_sent_is_refused(folder: str, file: str, reason: str) -> None:
+    """A reload tells the loop where it lies, and ended the daemon below a directory whose name is in Latin-1."""
+    text = f'[[scene.objects]]\nname = "ring"\nshape = "mesh"\nstiffness_n_per_m = 9.0\nfile = "{file}"\n'
+    with pytest.raises(ConfigError, match=rf"scene.objects\[0\].file = .*: .*{reason}"):
+        parse(text, f"/{folder}/lab.toml")
+
+
 def test_a_law_of_ones_own_is_named_by_its_module(monkeypatch: pytest.MonkeyPatch) -> None:
     own = ModuleType("mylab.laws")
     law = parse("", "x").law

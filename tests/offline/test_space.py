@@ -38,6 +38,11 @@ def test_the_law_steadies_what_is_unsteady_without_it(kind: str, stiffness: floa
     assert max(spans_m(kind, stiffness, "none", FEW)) > 2.0 * STILL_M
 
 
+def test_a_spring_along_the_surface_that_is_a_few_counts_long_is_held_as_well() -> None:
+    """A law that takes the force of one place for that of another feels a tenth of the mass, and damps too little."""
+    assert press("plane", 18e3, None, 59).peak_to_peak_m < STILL_M
+
+
 @pytest.mark.nightly
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("stiffness", STIFFNESSES)

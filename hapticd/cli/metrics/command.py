@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import signal
 import sys
 from types import FrameType
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 
 ANSWER_S = 1.0
 """How long a daemon may take to answer [s]; who scrapes waits for 10 s."""
-
-_KEYS = frozenset(field.name for field in dataclasses.fields(Status))
 
 
 def metrics(
@@ -63,8 +60,9 @@ def _serve(listen: str) -> None:
     host, port = _address(listen)
     try:
         server = MetricsServer(host, port, Asked(lambda: _metrics(_daemons())))
-    except OSError as error:
-        raise HapticdError(f"--listen {listen}: {error.strerror}; name another address or port") from error
+    except (OSError, UnicodeError) as error:  # the latter of a host that is no name, such as a..b
+        why = error.strerror if isinstance(error, OSError) else "is no name of a host"
+        raise HapticdError(f"--listen {listen}: {why}; name another address or port") from error
     signal.signal(signal.SIGTERM, _end)
     with server:
         typer.echo(f"serving {server.url}", err=True)
@@ -88,12 +86,10 @@ def _daemons() -> Daemons:
 
 
 def _status(name: str) -> Status | None:
-    """What a daemon says; one of another version may say more or less."""
     try:
-        said = command("status", name, timeout_s=ANSWER_S)["status"]
+        return Status.of(command("status", name, timeout_s=ANSWER_S)["status"])
     except InstanceError:
         return None
-    return Status(**{key: value for key, value in said.items() if key in _KEYS})
 
 
 def _metrics(daemons: Daemons) -> list[Metric]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import re
 import select
@@ -260,6 +261,7 @@ def _print_lines(feed: _Feed, stop: Callable[[], bool]) -> None:
     """One line a second, events as they come, and a word when the daemon comes or goes."""
     due_s = time.monotonic() + 1.0
     silent = False
+    told_s = -math.inf
     while not stop():
         events = [record for record in feed.drain(0.1) if isinstance(record, Event)]
         for event in events:
@@ -268,7 +270,9 @@ def _print_lines(feed: _Feed, stop: Callable[[], bool]) -> None:
             continue
         due_s += 1.0
         if not feed.silent() and feed.known.status is not None:
-            _say(one_line(feed.known))
+            if feed.known.heard_s > told_s:  # else the line would be that of before, as if the daemon still said so
+                _say(one_line(feed.known))
+            told_s = feed.known.heard_s
             silent = False
         elif not silent:
             typer.echo(f"waiting for a daemon on {feed.endpoint}{feed.doubt}", err=True)
