@@ -29,7 +29,7 @@ SERVICE_EXTRAS := metrics,dashboard
 PLACE = $(DESTDIR)$(PREFIX)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint web clients nightly repeat bench packages clean install uninstall own-place deb
+.PHONY: help run test read lint web clients nightly repeat bench packages clean install uninstall own-place deb
 
 help:
 	@echo "make run      the daemon on a simulated device, shown live; ends with Ctrl-C"
@@ -37,7 +37,7 @@ help:
 	@echo "make lint     formatting, style, types and import rules only"
 	@echo "make web      uPlot for hapticd dashboard, by npm, in the version and with the hash that views/ names"
 	@echo "make nightly  the long runs: every shipped configuration, every property on many examples"
-	@echo "make repeat   tests that start a daemon, again and again: REPEAT=50, REPEAT_TESTS=files"
+	@echo "make repeat   tests that start a daemon, again and again: REPEAT=50, REPEAT_TESTS=files, REPEAT_WORKERS=3"
 	@echo "make bench    how long a tick takes on this machine"
 	@echo "make install  the daemon as a system service (as root); PREFIX=$(PREFIX), DESTDIR for packages"
 	@echo "make uninstall  all of that away again, except configurations and fault records"
@@ -47,10 +47,16 @@ help:
 run: $(READY_RUN)
 	$(BIN)/hapticd run --config config/hapticd.toml --watch
 
-# Most of the time is spent waiting for daemons that run in real time, so more workers than the two processors of CI; but
-# with four, real-time loops, their supervisors and compilers hold each other up too often.
-test: packages lint web clients
-	$(BIN)/pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+# Much of the time is spent waiting for daemons that run in real time, so more workers than the two processors of CI; but
+# with four that compute, real-time loops, their supervisors and compilers hold each other up too often: the fourth is
+# for files that mostly wait (tests/dealing.py).
+test: packages $(READY)
+	$(MAKE) --no-print-directory --jobs 2 lint read
+	$(BIN)/pytest --numprocesses 4 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+
+# While mypy is at work on the other processor: then no worker has to make bytecode of the tests.
+read: web clients $(READY)
+	@$(BIN)/pytest --collect-only -qq --no-header >$(VENV)/read.log || { cat $(VENV)/read.log; exit 1; }
 
 lint: $(READY)
 	$(BIN)/ruff check
@@ -86,14 +92,18 @@ nightly: packages web clients $(READY)
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
 	$(MAKE) repeat
 
-# Every test that starts a daemon, again and again beside a busy processor, three side by side. The whole takes a night:
+# Every test that starts a daemon, again and again beside a busy processor, three side by side. The whole takes more
+# than a night; stopped, it goes on with what has run least, and a run counts until something changes that its test
+# depends on (tests/tally.py, tests/content.py). A part of it:
 # make repeat REPEAT=10 REPEAT_TESTS=tests/daemon/test_deaths.py
 REPEAT ?= 50
+REPEAT_WORKERS ?= 3
 REPEAT_TESTS ?= tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views tests/remote \
-    tests/doctor tests/driven tests/your_simulator tests/test_readme.py tests/test_bridges_page.py tests/test_python_page.py
+    tests/doctor tests/driven tests/your_simulator tests/service/test_systemd.py tests/test_readme.py \
+    tests/test_bridges_page.py tests/test_python_page.py
 repeat: web clients $(READY)
-	REPEAT=$(REPEAT) $(BIN)/pytest $(REPEAT_TESTS) --numprocesses 3 --dist load --maxschedchunk 1 --max-worker-restart 0 \
-		--timeout 7200 --override-ini faulthandler_timeout=7260
+	REPEAT=$(REPEAT) $(BIN)/pytest $(REPEAT_TESTS) --numprocesses $(REPEAT_WORKERS) --dist load --maxschedchunk 1 \
+		--max-worker-restart 0 --timeout 1800 --override-ini faulthandler_timeout=1860
 
 bench: $(READY)
 	$(BIN)/hapticd bench tick

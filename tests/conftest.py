@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import zipfile
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
 
-from tests import repeating, standstill
+from tests import repeating, standstill, tally
+from tests.dealing import TOGETHER, WAITING, Dealing
 from tests.examples import TIMES, examples
 from tests.longest import LONGEST, ROOT, rank
 
@@ -30,19 +33,6 @@ settings.register_profile("unhurried", examples(100), deadline=None, derandomize
 settings.load_profile("unhurried")
 
 
-class _AmongOthers:
-    """With pytest-xdist, the process of it all hears from each worker what that has repeated."""
-
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        output = getattr(session.config, "workeroutput", None)
-        if output is not None:
-            output["repeated"] = repeating.times()
-
-    @pytest.hookimpl(optionalhook=True)
-    def pytest_testnodedown(self, node: Any) -> None:
-        repeating.add(getattr(node, "workeroutput", {}).get("repeated", {}))
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """Give every child the signals that a terminal gives it: a runner in the background has them ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -50,11 +40,19 @@ def pytest_configure(config: pytest.Config) -> None:
     in_charge = not hasattr(config, "workerinput")
     if in_charge:  # one witness, and one busy processor, for all workers
         _keep(config, standstill.witnesses())
+    _keep(config, _own_instances())
     if repeating.REPEAT > 1:
-        repeating.watch_for_daemons()
-        config.pluginmanager.register(_AmongOthers())
+        config.pluginmanager.register(repeating.Repeating(tally.opened(), repeating.REPEAT))
         if in_charge:
             _keep(config, repeating.busy_processor())
+
+
+@contextlib.contextmanager
+def _own_instances() -> Iterator[None]:
+    """Meet no daemon of this computer, nor one of another worker, where a test names no directory."""
+    with tempfile.TemporaryDirectory(prefix="hapticd-") as directory, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("HAPTICD_RUNTIME_DIR", directory)
+        yield
 
 
 def _keep(config: pytest.Config, what: contextlib.AbstractContextManager[None]) -> None:
@@ -64,12 +62,30 @@ def _keep(config: pytest.Config, what: contextlib.AbstractContextManager[None]) 
     config.add_cleanup(kept.close)
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
+    """Look for no garbage in what is read, which stays: that is half the time that reading takes."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        if hasattr(session.config, "workerinput"):  # nor later, in a worker that has read all there is
+            gc.freeze()
+        gc.enable()
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that take longest; in a file everything stays in order."""
-    missing = [name for name in LONGEST if not (ROOT / name).exists()]
+    missing = [name for name in (*LONGEST, *WAITING, *TOGETHER) if not (ROOT / name).exists()]
     if missing:
-        raise pytest.UsageError(f"tests/longest.py names what is not there: {', '.join(missing)}")
+        raise pytest.UsageError(f"tests/longest.py or tests/dealing.py names what is not there: {', '.join(missing)}")
     items.sort(key=lambda item: rank(item.path))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Dealing | None:
+    """Deal whole files out; None: as xdist does it where that is not what is asked."""
+    return Dealing(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 @pytest.fixture(scope="session")
@@ -99,14 +115,12 @@ def own_packages() -> Generator[None, None, None]:
 
 
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool:
-    """Repeat a test that starts a daemon, where that is asked for; else one during which the computer stood still."""
-    return repeating.repeated(item, nextitem) if repeating.REPEAT > 1 else standstill.run(item, nextitem)
+    """Run a test, and once more if it failed while the computer stood still."""
+    return standstill.run(item, nextitem)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say what was repeated, and what tests have to say though they pass: their property `prints`."""
-    if repeating.REPEAT > 1:
-        terminalreporter.write_line(repeating.said())
+    """Say what tests have to say though they pass: their property `prints`."""
     for report in terminalreporter.getreports("passed"):
         for name, said in report.user_properties:
             if name == "prints":

@@ -2,6 +2,8 @@
 
 `REPEAT=50 pytest tests/daemon` is what the nightly run has. A test that starts none runs once, as always. With
 `--numprocesses 4 --dist load --maxschedchunk 1` four tests are repeated side by side, each in a process of its own.
+What was stopped goes on with what has run least. `tests/tally.py` has counted: a run counts for as long as nothing is
+changed that its test depends on (`tests/content.py`).
 """
 
 from __future__ import annotations
@@ -11,69 +13,73 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests import standstill
+from tests.tally import Tally
 
 REPEAT = int(os.environ.get("REPEAT", "1"))
 _SPIN = "import os; os.sched_setaffinity(0, {{{cpu}}})\nwhile os.getppid() == {parent}: pass"
 
 _started = 0
-_times: dict[str, int] = {}  # how often each test that started a daemon has run
 
 
-def watch_for_daemons() -> None:
-    """Count the daemons that this process starts, by whatever way it starts them."""
+class Repeating:
+    """What pytest does with tests that start a daemon, and what it says about them in the end."""
 
-    def hear(event: str, arguments: tuple[Any, ...]) -> None:
-        global _started
-        if event == "subprocess.Popen" and _is_daemon(arguments[1]):
-            _started += 1
+    def __init__(self, tally: Tally, times: int) -> None:
+        _watch_for_daemons()
+        self._tally = tally
+        self._times = times
+        self._repeats = False
+        self._reports: list[pytest.TestReport] = []
 
-    sys.addaudithook(hear)
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
+        """Leave out what has run often enough before, and begin with what has run least."""
+        due = [item for item in items if not self._tally.done(item.nodeid, self._times)]
+        config.hook.pytest_deselected(items=[item for item in items if item not in due])
+        items[:] = sorted(due, key=lambda item: self._tally.passes(item.nodeid))
 
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item, nextitem: pytest.Item | None) -> bool:
+        """Run a test, and again if a daemon runs for it, until enough runs are counted or one fails."""
+        if self._repeats:
+            self._reports = standstill.reports(item, nextitem)
+            return True
+        self._repeats = True
+        hook = item.ihook
+        hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+        for number in range(self._tally.passes(item.nodeid), self._times):
+            before = _started
+            # All the way round, so that a time limit is one of each run.
+            hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
+            daemon = _started > before or _daemon_runs() or number > 0
+            failed = any(report.failed for report in self._reports)
+            self._tally.add(item.nodeid, passed=not failed, daemon=daemon)
+            if failed:
+                for report in self._reports:
+                    report.sections.append(("repeat", f"in run {number + 1} of {self._times}"))
+            if failed or not daemon or number == self._times - 1:
+                for report in self._reports:
+                    hook.pytest_runtest_logreport(report=report)
+                break
+        hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        self._repeats = False
+        return True
 
-def repeated(item: pytest.Item, next_item: pytest.Item | None) -> bool:
-    """Run a test, and again as often as `REPEAT` says if it has started a daemon; the first that fails is the last."""
-    hook = item.ihook
-    hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-    for number in range(REPEAT):
-        before = _started
-        reports = standstill.reports(item, next_item)
-        if _started > before or item.nodeid in _times:
-            _times[item.nodeid] = number + 1
-        failed = any(report.failed for report in reports)
-        if failed:
-            for report in reports:
-                report.sections.append(("repeat", f"in run {number + 1} of {REPEAT}"))
-        if failed or _started == before or number == REPEAT - 1:
-            for report in reports:
-                hook.pytest_runtest_logreport(report=report)
-            break
-    hook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
-    return True
+    def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
+        """Fail nothing where all has run often enough before."""
+        if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and self._tally.begun():
+            session.exitstatus = pytest.ExitCode.OK
 
-
-def times() -> dict[str, int]:
-    """How often each test that started a daemon has run in this process."""
-    return dict(_times)
-
-
-def add(others: dict[str, int]) -> None:
-    """Count what another process has run; a test that starts the daemon of its file does so in each of them."""
-    for name, count in others.items():
-        _times[name] = max(count, _times.get(name, 0))
-
-
-def said() -> str:
-    """What was repeated, in a line; those whose daemon serves a whole file run once or twice."""
-    often = sum(times == REPEAT for times in _times.values())
-    return (
-        f"{len(_times)} tests started a daemon: {often} of them ran {REPEAT} times beside a busy processor, "
-        f"{len(_times) - often} fewer"
-    )
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Say how often the tests have run, this time and before, and which have failed."""
+        for line in self._tally.lines():
+            terminalreporter.write_line(line)
 
 
 @contextlib.contextmanager
@@ -87,6 +93,30 @@ def busy_processor() -> Iterator[None]:
             spinning.kill()
 
 
+def _watch_for_daemons() -> None:
+    """Count the daemons that this process starts, by whatever way it starts them."""
+
+    def hear(event: str, arguments: tuple[Any, ...]) -> None:
+        global _started
+        if event == "subprocess.Popen" and _is_daemon(arguments[1]):
+            _started += 1
+
+    sys.addaudithook(hear)
+
+
+def _daemon_runs() -> bool:
+    """Whether one that serves a whole file of tests is there."""
+    for children in Path("/proc/self/task").glob("*/children"):
+        for pid in children.read_text().split():
+            with contextlib.suppress(OSError):
+                words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
+                if _is_daemon(words):
+                    return True
+    return False
+
+
 def _is_daemon(command: Any) -> bool:
+    """Whether a command starts one: as a user does, in a test's own process, or as a service of a machine."""
     words = [os.fsdecode(word) for word in command] if isinstance(command, list | tuple) else [str(command)]
-    return "run" in words and any(word.rsplit("/", 1)[-1] == "hapticd" for word in words)
+    named = any(word.rsplit("/", 1)[-1] == "hapticd" for word in words)
+    return (named and "run" in words) or "hapticd.loop.process" in words or {"systemctl", "start"} <= set(words)

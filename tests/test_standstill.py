@@ -24,12 +24,22 @@ def pytest_runtest_protocol(item, nextitem):
 
 TEST = """
 from pathlib import Path
+import pytest
 from tests import standstill
-def test_that_fails_at_first():
+@pytest.fixture(scope="module")
+def daemon():
+    daemons = Path(__file__).with_name("daemons")
+    daemons.write_text(daemons.read_text() + "x")
+    return len(daemons.read_text())
+def test_before(daemon):
+    assert daemon == 1
+def test_that_fails_at_first(daemon):
     runs = Path(__file__).with_name("runs")
     runs.write_text(runs.read_text() + "x")
     {during}
-    assert len(runs.read_text()) > 1
+    assert daemon > 1
+def test_after(daemon):
+    assert daemon == len(Path(__file__).with_name("runs").read_text())
 """
 
 STOOD = "standstill.longest_s = lambda since_s: 0.2"
@@ -64,9 +74,11 @@ def test_a_witness_that_got_no_processor_tells_for_how_long(monkeypatch: pytest.
 
 @pytest.mark.parametrize(("during", "runs", "code"), [("pass", 1, 1), (STOOD, 2, 0)])
 def test_what_fails_runs_again_only_after_a_standstill(tmp_path: Path, during: str, runs: int, code: int) -> None:
+    """And then with another daemon, which those after it have too: the one before has ended."""
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_it.py").write_text(TEST.format(during=during))
-    (tmp_path / "runs").write_text("")
+    for counted in ("runs", "daemons"):
+        (tmp_path / counted).write_text("")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir=.", "."]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTEST_ADDOPTS": ""}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)

@@ -1,0 +1,91 @@
+"""How often each test has run, in a file to which every process adds: what was stopped goes on from there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.content import Content
+
+ROOT = Path(__file__).parent.parent
+STEPS = (50, 20, 10, 2, 1, 0)
+"""Numbers of runs by which the summary sorts the tests."""
+
+
+@dataclass
+class Count:
+    """What has come of a test: runs that passed since it failed last, runs that failed, whether a daemon ran for it."""
+
+    passes: int = 0
+    failures: int = 0
+    daemon: bool = False
+
+    def add(self, passed: bool, daemon: bool) -> None:
+        """One more run."""
+        self.passes = self.passes + 1 if passed else 0
+        self.failures += not passed
+        self.daemon |= daemon
+
+
+def opened() -> Tally:
+    """The tally of this checkout."""
+    return Tally(ROOT / "build" / "repeats.jsonl", Content(ROOT).of)
+
+
+class Tally:
+    """The runs of each test in the version that it has now; what the file has of others counts for nothing.
+
+    Args:
+        path: the file.
+        version: of a test, by its name.
+    """
+
+    def __init__(self, path: Path, version: Callable[[str], str]) -> None:
+        self._path = path
+        self._version = version
+        self._counts = self._read()
+
+    def add(self, test: str, *, passed: bool, daemon: bool) -> None:
+        """Note a run: a whole line at the end of the file, so that other processes may do so at the same time."""
+        self._counts.setdefault(test, Count()).add(passed, daemon)
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        line = {"version": self._version(test), "test": test, "passed": passed, "daemon": daemon}
+        with self._path.open("ab", buffering=0) as file:
+            file.write(json.dumps(line).encode() + b"\n")
+
+    def passes(self, test: str) -> int:
+        """How often a test has passed since it failed last."""
+        return self._counts.get(test, Count()).passes
+
+    def done(self, test: str, times: int) -> bool:
+        """Whether a test has passed so many times in a row, or once if it needs no daemon."""
+        count = self._counts.get(test, Count())
+        return count.passes >= (times if count.daemon else 1)
+
+    def begun(self) -> bool:
+        """Whether any test has run."""
+        return bool(self._counts)
+
+    def lines(self) -> list[str]:
+        """How many tests that start a daemon have passed how often, by all processes, and every test that failed."""
+        counts = self._read()
+        often = [count.passes for count in counts.values() if count.daemon]
+        said = [f"{len(often)} tests start a daemon; runs that passed in a row beside a busy processor:"]
+        for step, above in zip(STEPS, (float("inf"), *STEPS), strict=False):
+            tests = sum(step <= passes < above for passes in often)
+            if tests:
+                said.append(f"  {step} or more: {tests} tests")
+        failed = {test: count for test, count in counts.items() if count.failures}
+        said.append(f"{len(failed)} tests have failed")
+        said += [f"  {test}: {count.failures} times, then passed {count.passes}" for test, count in failed.items()]
+        return said
+
+    def _read(self) -> dict[str, Count]:
+        counts: dict[str, Count] = {}
+        for line in self._path.read_text().splitlines() if self._path.exists() else ():
+            run = json.loads(line)
+            if run["version"] == self._version(run["test"]):
+                counts.setdefault(run["test"], Count()).add(run["passed"], run["daemon"])
+        return counts
