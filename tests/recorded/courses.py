@@ -188,7 +188,8 @@ def follow(law_name: str, keys: str, course: Course) -> Journal:
     place = Place(**course.begin)
     tick = LawTick(place.resolution_m)
     seen_m = _counted(place)
-    law.start(state, params, LawSnapshot(seen_m, debt_j=course.debt_j, damping_n_s_per_m=course.damping_n_s_per_m))
+    holds_n = -place.hand_n  # what the hand leans against
+    law.start(state, params, LawSnapshot(seen_m, 0.0, holds_n, course.debt_j, course.damping_n_s_per_m))
     heard_n: list[float] = []
     forces_n = [0.0] * (place.late + 1)
     for journal.tick in range(course.ticks):

@@ -7,6 +7,7 @@ from functools import partial
 
 from tests.recorded.clients import HEARD
 from tests.recorded.courses import FOLLOWED
+from tests.recorded.creases import VISITED
 from tests.recorded.journal import Journal
 from tests.recorded.laws import PRESSES
 from tests.recorded.loops import run
@@ -18,5 +19,6 @@ RUNS: dict[str, Callable[[], Journal]] = {
     **PRESSES,
     **FOLLOWED,
     **HEARD,
+    **VISITED,
     **{name: partial(run, script) for name, script in SCRIPTS.items()},
 }
