@@ -45,6 +45,7 @@ class Room:
 
 def _law(name: str) -> Room:
     own = [name] if name != "none" else []
+    own += ["ring_damping_rules"] if name == "ring_damping" else []
     own += ["cycle_sums"] if name in ("energy_cycle", "late_cycle") else []
     select = f"{name} or {name.replace('_', '-')} or give_every_law"
     tests = (*(f"tests/controllers/test_{each}.py" for each in own), *LAW_TESTS)
@@ -73,7 +74,10 @@ ROOMS = {
             *(f"hapticd/tick/space/{name}.py" for name in ("books", "channel", "crease")),
             *(f"hapticd/tick/space/{name}.py" for name in ("solid", "solid_contact", "tick")),
         ),
-        ("tests/tick/space", "tests/shapes/test_solid.py", "tests/shapes/test_friction.py", RUNS, WALKS),
+        (
+            "tests/tick/space", "tests/shapes/test_solid.py", "tests/shapes/test_friction.py",
+            *(f"tests/tick/remote/test_{name}.py" for name in ("turning", "objects", "resting_object")), RUNS, WALKS,
+        ),
     ),
     "shapes": Room(
         tuple(
@@ -139,7 +143,9 @@ ROOMS = {
     "keys": Room(
         tuple(
             f"hapticd/keys/{name}.py"
-            for name in ("connections", "file", "frames", "heartbeat", "memory", "policy", "server", "store")
+            for name in (
+                "connections", "file", "frames", "heartbeat", "local_bind", "memory", "policy", "server", "store"
+            )
         ),
         ("tests/keys",),
     ),
@@ -150,7 +156,10 @@ ROOMS = {
             for name in ("questions", "messages", "conversation", "mapping", "serial_driver", "serial_faults")
         ),
     ),
-    "motion of the rig": Room(("drivers/hapticd_drivers/rig/motion.py",), ("tests/drivers/rig/test_motion.py",)),
+    "motion of the rig": Room(
+        ("drivers/hapticd_drivers/rig/motion.py",),
+        ("tests/drivers/rig/test_motion.py", "tests/drivers/rig/test_motion_bounds.py"),
+    ),
 }  # fmt: skip
 
 REACHING = ("hapticd/tick", "hapticd/shapes", "hapticd/loop", "hapticd/keys", "hapticd/remote")

@@ -28,7 +28,7 @@ QUICK = {
 @pytest.mark.parametrize("name", QUICK)
 def test_every_slip_of_a_small_sample_is_found(name: str) -> None:
     """Six of each, always the same ones, by the tests of the module alone; the one that changes nothing lives."""
-    verdict = judge(QUICK[name], sample(QUICK[name], 6, seed=4))
+    verdict = judge(QUICK[name], sample(QUICK[name], 6, seed=87))
     assert verdict.made == 6
     assert not verdict.survivors, told(verdict.survivors)
     assert len(verdict.harmless) == 1
