@@ -35,7 +35,7 @@ def serve_threaded(connection: Connection, text: str, heavy: bool) -> None:
     try:
         config = parse(text, "benchmark")
         settings = config.config
-        driver = config.driver(config.options, settings.loop.period_s)
+        driver = config.make_driver()
         place_device(config, driver)
         info = driver.open()
         layout = RecordLayout(len(info.axes), info.has_orientation, MAX_WALLS)

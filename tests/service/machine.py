@@ -109,14 +109,14 @@ class Machine:
         supervisor = control = 0
         for entry in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
-                status = (entry / "status").read_text()
-                inside = next(line for line in status.splitlines() if line.startswith("NSpid:")).split()[-1]
-                command = (entry / "cmdline").read_bytes().decode().split("\0")
                 if (entry / "ns/pid").readlink() != namespace:
                     continue
+                status = (entry / "status").read_bytes()  # and a command line: bytes of any kind
+                inside = next(line for line in status.splitlines() if line.startswith(b"NSpid:")).split()[-1].decode()
+                command = (entry / "cmdline").read_bytes().split(b"\0")
                 if inside == main:
                     supervisor = int(entry.name)
-                elif "hapticd.loop.process" in command and command[-2] == main:
+                elif b"hapticd.loop.process" in command and command[-2].decode() == main:
                     control = int(entry.name)
         assert supervisor
         assert control, self.journal()
@@ -172,7 +172,7 @@ def booted(log: Path) -> Iterator[Machine]:
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hapticd-tests"
     cache.mkdir(parents=True, exist_ok=True)
     with (cache / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # one machine at a time uses the tree
+        fcntl.flock(lock, fcntl.LOCK_EX)  # one machine at a time uses the tree and our control group
         release, mirror = _distribution()
         tree = _made(cache, "tree", " ".join((release, *PACKAGES)), lambda place: _debootstrap(place, release, mirror))
         python = max(tree.glob("usr/bin/python3.*[0-9]")).name.removeprefix("python")

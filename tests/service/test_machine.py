@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shlex
 import subprocess
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.service.machine import NODES, broken_nodes
+from tests.service.machine import NODES, Machine, broken_nodes
 
 
 def test_this_computer_has_its_devices() -> None:
@@ -37,3 +38,21 @@ def test_another_device_of_that_name_is_none(tmp_path: Path) -> None:
     for name in NODES:
         (tmp_path / name).symlink_to("/dev/zero")
     assert f"{tmp_path}/null, {tmp_path}/full, {tmp_path}/random, {tmp_path}/urandom: not" in broken_nodes(tmp_path)
+
+
+def test_processes_are_found_beside_one_whose_command_is_no_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits = ("sh", "-c", "read line")
+    with contextlib.ExitStack() as stack:
+
+        def started(*words: str | bytes) -> int:
+            process = stack.enter_context(subprocess.Popen([*waits, *words], stdin=subprocess.PIPE))
+            stack.callback(process.kill)
+            return process.pid
+
+        started(b"\xff")
+        supervisor = started()
+        control = started("hapticd.loop.process", "--parent", str(supervisor))
+        machine = object.__new__(Machine)
+        monkeypatch.setattr(machine, "_leader", os.getpid(), raising=False)
+        monkeypatch.setattr(machine, "show", lambda *_: str(supervisor))
+        assert machine.processes("hapticd.service") == (supervisor, control)

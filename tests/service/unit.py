@@ -19,13 +19,20 @@ class Service:
         self.endpoint = f"ipc://{machine.path(f'/run/hapticd/{instance}/telemetry')}"
         self.write(config)
         self._forget_failures()
-        machine.run("systemctl", "start", self.unit)
-        self.supervisor, self.control = machine.processes(self.unit)
+        try:
+            machine.run("systemctl", "start", self.unit)
+            self.supervisor, self.control = machine.processes(self.unit)
+        except BaseException:  # or the next test would find it started
+            self._stop()
+            raise
 
     def __enter__(self) -> Service:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._stop()
+
+    def _stop(self) -> None:
         self.machine.run("systemctl", "stop", self.unit)
         self._forget_failures()
 

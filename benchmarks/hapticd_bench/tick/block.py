@@ -79,7 +79,7 @@ def run_loop(
         HapticdError: the device cannot be used, or the loop stopped by a fault.
     """
     settings = config.config
-    driver = config.driver(config.options, settings.loop.period_s)
+    driver = config.make_driver()
     place_device(config, driver)
     info = driver.open()
     shared = SharedMemory(RecordLayout(len(info.axes), info.has_orientation, MAX_WALLS), settings.loop.rate_hz)
