@@ -72,9 +72,9 @@ def test_what_is_free_is_given_back_before_any_connection_is_ended(
 def test_what_was_freed_is_no_longer_resident_once_it_is_given_back() -> None:
     """In a process of its own: what other tests have freed would count as well, and what they take as less."""
     code = (
-        "from hapticd.keys import memory; many = [bytes(100_000) for _ in range(640)]; before = memory.resident_bytes();"
-        " many[:-1] = []; freed = memory.resident_bytes(); memory._give_back();"
-        " print(before - freed, before - memory.resident_bytes())"
+        "from hapticd.keys import memory; many = [bytes(100_000) for _ in range(640)]; "
+        "before = memory.resident_bytes(); many[:-1] = []; freed = memory.resident_bytes(); "
+        "memory._give_back(); print(before - freed, before - memory.resident_bytes())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     freed_bytes, given_bytes = map(int, done.stdout.split())
