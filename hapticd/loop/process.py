@@ -27,7 +27,7 @@ from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import DEVICE_LOST, FORCE_LEFT, GO, SUPERVISOR_BEAT, SharedMemory
-from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
+from hapticd.loop.realtime import become_realtime, die_with_parent, leave_realtime, sleep_until
 from hapticd.loop.resume import ResumeState, identity
 from hapticd.loop.warm_up import warm_up
 from hapticd.tick.assemble import make_tick, place_device
@@ -74,6 +74,7 @@ def main() -> int:
         ended = DEVICE_LOST
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd and the supervisor both send one; it is over
+        leave_realtime()
     force_left = control.session.driver.force_left
     if force_left:
         sys.stderr.write(f"the driver could not take the force away: {force_left}\n")

@@ -78,6 +78,11 @@ def become_realtime(config: LoopConfig) -> tuple[list[str], list[str]]:
     return problems, advice
 
 
+def leave_realtime() -> None:
+    """Have what is left to do at normal priority, so that the end of this loop holds up no other on its processor."""
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 def sleep_until(deadline_ns: int) -> int:
     """Sleep until a CLOCK_MONOTONIC time and return when it woke [ns]; no signal cuts it short.
 
