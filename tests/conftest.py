@@ -17,7 +17,7 @@ import pytest
 from hypothesis import settings
 from xdist.remote import Producer
 
-from tests import repeating, standstill, tally
+from tests import neighbour, repeating, standstill, tally
 from tests.dealing import TOGETHER, WAITING, Dealing
 from tests.examples import TIMES, examples
 from tests.longest import LONGEST, ROOT, rank
@@ -38,8 +38,9 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     in_charge = not hasattr(config, "workerinput")
-    if in_charge:  # one witness, and one busy processor, for all workers
+    if in_charge:  # one witness, one neighbour and one busy processor for all workers
         _keep(config, standstill.witnesses())
+        _keep(config, neighbour.neighbour())
     _keep(config, _own_instances())
     if repeating.REPEAT > 1:
         config.pluginmanager.register(repeating.Repeating(tally.opened(), repeating.REPEAT))
