@@ -315,7 +315,8 @@ class ControlTick:
         Ramps go by the time that has passed on this computer's clock, since a hand feels for how long a force is held
         and not in how many ticks; those of a simulated device go by one period a tick, so that a run can be repeated.
 
-        Where the device has nothing new, laws and books wait; what they asked for last is held.
+        Where the device has nothing new, laws and books wait; what they asked for last is held, and what the clients of
+        couplings and forces change goes on.
 
         Args:
             sample: the newest state of the device.

@@ -6,7 +6,7 @@ from math import sqrt
 
 from hapticd.config.remote import PortLimits
 from hapticd.tick.remote.follower import Follower
-from hapticd.tick.remote.one_port import OnePort
+from hapticd.tick.remote.one_port import OnePort, PortAxis
 from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.ramped import Ramped
 from hapticd.tick.remote.update import DAMPING, POSITION, STIFFNESS, VELOCITY, Update
@@ -32,7 +32,7 @@ class Coupling(OnePort):
         damping: of its damper, without the law's [N s/m].
     """
 
-    __slots__ = ("_left_s", "_speed_m_per_s", "_stretch_m", "_unsaid_s", "damping", "follower")
+    __slots__ = ("_gone_m", "_left_s", "_speed_m_per_s", "_stretch_m", "_unsaid_s", "damping", "follower")
 
     def __init__(self, limits: PortLimits, site: PortSite) -> None:
         super().__init__(limits, site)
@@ -40,6 +40,7 @@ class Coupling(OnePort):
         self.target_m = self.follower.at_m
         self.damping = Ramped(limits.damping_n_s_per_m)
         self._stretch_m = self._speed_m_per_s = 0.0
+        self._gone_m = [0.0] * len(self.channels)  # of the followed target, since the last sample
         self._left_s = 0.0  # until spring and damper have come in
         self._unsaid_s = site.come_in_s
 
@@ -73,16 +74,43 @@ class Coupling(OnePort):
     def _begin(self) -> None:
         motion = self.motion
         self.follower.begin(motion.position_m, motion.velocity_m_per_s)
+        self._gone_m[:] = [0.0] * len(self._gone_m)
         self._left_s = come_in_s = self._come_in_s()
         # Not from nothing: without a spring a law would not see that one begins.
         share = self._period_s / come_in_s if self._period_s < come_in_s else 1.0
         self.stiffness.begin(share)
         self.damping.begin(share)
 
-    def _see(self, dt_s: float) -> None:
+    def _see(self, dt_s: float, moved_s: float) -> None:
         follower = self.follower
-        if self.channels[0].in_contact:  # else it has just begun
-            follower.move(dt_s)
+        gone_m = self._gone_m
+        if moved_s > 0.0:
+            follower.move(moved_s)
+        motion = self.motion
+        driven = self.limits.driven
+        for axis, (channel, x, speed, spring_n, contact_n) in enumerate(self._pull()):
+            way_m = motion.position_m[axis] - self._from_m[axis]
+            against_m = way_m - follower.moved_m[axis]
+            if driven:
+                channel.see(1.0, x, against_m - gone_m[axis], speed, dt_s, spring_n, contact_n)
+            else:
+                channel.see(1.0, x, way_m, motion.velocity_m_per_s[axis], dt_s, spring_n, contact_n)
+            channel.way_m = against_m  # by which the books go: they have the target's way of before
+            gone_m[axis] = 0.0
+
+    def _wait(self, passed_s: float) -> bool:
+        """The target, stiffness and damping go on at every tick: what they change is the client's, not the device's."""
+        follower = self.follower
+        follower.move(passed_s)
+        for axis, (channel, x, _, spring_n, contact_n) in enumerate(self._pull()):
+            self._gone_m[axis] += follower.moved_m[axis]
+            channel.x_of_law_m = channel.tick.x_m = x
+            channel.push(contact_n, spring_n)
+        return True
+
+    def _pull(self) -> list[tuple[PortAxis, float, float, float, float]]:
+        """Each axis, how far and how fast the device is from the target along it, the spring's force and both."""
+        follower = self.follower
         motion = self.motion
         x_m, speeds = [], []
         x_squared = speed_squared = 0.0
@@ -98,25 +126,24 @@ class Coupling(OnePort):
         limit_n = self.limit_n
         k = self.stiffness.force(stretch_m, limit_n) / stretch_m if stretch_m > LEAST_M else self.stiffness.now
         b = self.damping.force(speed_m_per_s, limit_n) / speed_m_per_s if speed_m_per_s > 0.0 else 0.0
-        driven = self.limits.driven
-        for axis, channel in enumerate(self.channels):
-            x = x_m[axis]
-            if -LEAST_M < x < LEAST_M:
-                x = -LEAST_M
-            way_m = motion.position_m[axis] - self._from_m[axis]
-            against_m = way_m - follower.moved_m[axis]
-            spring_n = -k * x
-            contact_n = spring_n - b * speeds[axis]
-            if driven:
-                channel.see(1.0, x, against_m, speeds[axis], dt_s, spring_n, contact_n)
-            else:
-                channel.see(1.0, x, way_m, motion.velocity_m_per_s[axis], dt_s, spring_n, contact_n)
-                channel.way_m = against_m  # by which the books go
+        pulls = []
+        for channel, x, speed in zip(self.channels, x_m, speeds, strict=True):
+            off_m = -LEAST_M if -LEAST_M < x < LEAST_M else x
+            spring_n = -k * off_m
+            pulls.append((channel, off_m, speed, spring_n, spring_n - b * speed))
+        return pulls
 
     def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
         moved_m = self.follower.moved_m
         self.books.carry(sum([channel.applied_n * moved_m[axis] for axis, channel in enumerate(self.channels)]))
         super()._enter(gain, limit_n, dt_s)
+
+    def _enter_wait(self, gain: float, limit_n: float) -> None:
+        carried_j = spring_j = 0.0
+        for channel, moved_m in zip(self.channels, self.follower.moved_m, strict=True):
+            carried_j += channel.applied_n * moved_m
+            spring_j += channel.held_n * moved_m
+        self.books.wait(carried_j, spring_j, self._stretch_m, self.stiffness, gain, self.weight, limit_n)
 
     def _go_on(self, passed_s: float) -> None:
         super()._go_on(passed_s)

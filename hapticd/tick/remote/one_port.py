@@ -13,6 +13,7 @@ from hapticd.config.remote import PortLimits
 from hapticd.law import LawSnapshot
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.guard import start_blend
+from hapticd.tick.motion import LEAST_S
 from hapticd.tick.remote.books import PortBooks
 from hapticd.tick.remote.line import Line
 from hapticd.tick.remote.port import Port, PortState
@@ -53,12 +54,13 @@ class OnePort(Port):
     """
 
     __slots__ = (
-        "_due",
+        "_begun",
         "_from_m",
-        "_gain",
         "_most_change_n",
         "_outside_s",
         "_period_s",
+        "_sample_s",
+        "_waits",
         "asleep",
         "books",
         "channels",
@@ -85,7 +87,9 @@ class OnePort(Port):
         self.asleep = True
         self.leaving = False
         self._period_s = site.period_s
-        self._due = False
+        self._begun = False  # since its weight was 0
+        self._waits = False  # it has gone on since the last sample
+        self._sample_s = 0.0  # of a sample that no law has been shown yet
         self._outside_s = self._most_change_n = 0.0
         self._from_m = [0.0] * axes  # where the device was
 
@@ -129,23 +133,12 @@ class OnePort(Port):
         self._most_change_n = limits.max_force_n - self.most_n
 
     def observe(self, dt_s: float) -> None:
-        """See a new sample.
+        """Know of a new sample.
 
         Args:
             dt_s: time since the last one, more than 0 [s].
         """
-        if self.asleep:
-            return
-        self._due = True
-        position_m = self.motion.position_m
-        if self.state is not _HELD and self.weight == 0.0:
-            self._see_outside(dt_s)
-            return
-        if not self.channels[0].in_contact:
-            self._begin()
-            self._from_m[:] = position_m
-        self._see(dt_s)
-        self._from_m[:] = position_m
+        self._sample_s = dt_s
 
     def act(self, periods: float) -> None:
         """Ask the laws for their forces.
@@ -158,22 +151,26 @@ class OnePort(Port):
         """
         if self.asleep:
             return
-        if self._due:  # once a tick, also where a law fails and all are asked again
-            self._due = False
-            self._go_on(periods * self._period_s)
+        if self._sample_s > 0.0:  # once a tick, also where a law fails and all are asked again
+            passed_s = periods * self._period_s
+            self._look(self._sample_s, passed_s)
+            self._sample_s = 0.0
+            self._go_on(passed_s)
         for channel in self.channels:
             channel.ask(periods)
         self._limit()
 
     def hold(self, periods: float) -> None:
-        """Stay with what the laws asked for last, at a tick without a new sample; ramps go on.
+        """Stay with what the laws added last, at a tick without a new sample; what is the port's own goes on.
 
         Args:
             periods: time since the last tick, in periods of the loop.
         """
         if self.asleep:
             return
-        self._go_on(periods * self._period_s)
+        passed_s = periods * self._period_s
+        self._waits = self._begun and self._wait(max(passed_s, LEAST_S))
+        self._go_on(passed_s)
         for channel in self.channels:
             channel.ask_again(periods)
         self._limit()
@@ -193,6 +190,8 @@ class OnePort(Port):
         self.limit_n = limit_n = min(limit_n, self.most_n)
         if dt_s > 0.0:
             self._enter(gain, limit_n, dt_s)
+        elif self._waits:
+            self._enter_wait(gain, limit_n)
         spring_squared = 0.0
         for channel in channels:
             spring_squared += channel.wall.spring_n * channel.wall.spring_n
@@ -223,8 +222,22 @@ class OnePort(Port):
         """Come into force where the device is."""
         raise NotImplementedError
 
-    def _see(self, dt_s: float) -> None:
-        """Show the laws a new sample."""
+    def _see(self, dt_s: float, moved_s: float) -> None:
+        """Show the laws a new sample.
+
+        Args:
+            dt_s: time since the last one, more than 0 [s].
+            moved_s: for how long what the client moves has yet to go on; 0: it has just begun [s].
+        """
+        raise NotImplementedError
+
+    def _wait(self, passed_s: float) -> bool:
+        """Go on at a tick without a new sample, with the device where it was; False: there is nothing to move [s]."""
+        del passed_s
+        return False
+
+    def _enter_wait(self, gain: float, limit_n: float) -> None:
+        """Keep for the books what became of it in such a tick."""
         raise NotImplementedError
 
     def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
@@ -247,10 +260,13 @@ class OnePort(Port):
         self.pass_time(passed_s)
         step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
         if self.state is _HELD:
-            if self.channels[0].in_contact:  # a ramp begins with the first sample that there is a force for
+            if self._begun:  # a ramp begins with the first sample that there is a force for
                 self.weight = min(1.0, self.weight + step)
-        elif self.weight > 0.0:
-            self.weight = self.weight - step if self.weight > step else 0.0
+        elif self.weight > step:
+            self.weight -= step
+        else:
+            self.weight = 0.0
+            self._begun = False  # who speaks from now on begins where the device is, with the next sample
         goal_n = self.limits.max_force_n
         if self.most_n != goal_n:
             change_n = self._most_change_n * step
@@ -270,6 +286,26 @@ class OnePort(Port):
         for channel in channels:
             channel.force_n *= scale
 
+    def _look(self, dt_s: float, passed_s: float) -> None:
+        """See a new sample, with what the client moves where it is then.
+
+        Both clocks tell the time since the last sample where that was seen in the last tick. Where ticks went by in
+        between, only this computer's tells what is left of it.
+        """
+        if self.state is not _HELD and self.weight == 0.0:
+            self._see_outside(dt_s)
+            return
+        position_m = self.motion.position_m
+        moved_s = max(passed_s, LEAST_S) if self._waits else dt_s
+        if not self._begun:
+            self._begun = True
+            moved_s = 0.0
+            self._begin()
+            self._from_m[:] = position_m
+        self._waits = False
+        self._see(dt_s, moved_s)
+        self._from_m[:] = position_m
+
     def _see_outside(self, dt_s: float) -> None:
         """See a sample while nothing is in force; laws that keep time are asked on for a while."""
         self._outside_s = self._outside_s + dt_s if not self.channels[0].in_contact else 0.0
@@ -284,7 +320,8 @@ class OnePort(Port):
         """Do nothing until a client speaks."""
         self.asleep = True
         self.weight = self.scale = self._outside_s = 0.0
-        self._due = False
+        self._begun = self._waits = False
+        self._sample_s = 0.0
         self.books.let_go()
         for axis, channel in enumerate(self.channels):
             channel.rest()
@@ -385,14 +422,16 @@ class PortAxis(Channel):
         Contact.hold(self, periods)
         self.asked_n = self.force_n
 
-    def push(self, contact_n: float) -> None:
+    def push(self, contact_n: float, spring_n: float = 0.0) -> None:
         """Have the port's own force be another one from this tick on; what its law asked for goes along.
 
         Args:
             contact_n: the force [N].
+            spring_n: the part of it that is a spring's [N].
         """
         self.requested_n += contact_n - self._contact_n
         self.tick.contact_n = self._contact_n = contact_n
+        self.tick.spring_n = self.wall.spring_n = spring_n
 
     def apply_scaled(self, share: float, scale: float) -> None:
         """Remember what is applied from now on.

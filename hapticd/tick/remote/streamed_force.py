@@ -75,7 +75,8 @@ class StreamedForce(OnePort):
     def _begin(self) -> None:
         self._now_n[:] = [0.0] * len(self._now_n)
 
-    def _see(self, dt_s: float) -> None:
+    def _see(self, dt_s: float, moved_s: float) -> None:
+        del moved_s
         motion = self.motion
         for axis, channel in enumerate(self.channels):
             moved_m = motion.position_m[axis] - self._from_m[axis]
