@@ -102,9 +102,11 @@ class Coupling(OnePort):
         """The target, stiffness and damping go on at every tick: what they change is the client's, not the device's."""
         follower = self.follower
         follower.move(passed_s)
-        for axis, (channel, x, _, spring_n, contact_n) in enumerate(self._pull()):
+        for axis, (channel, x, speed, spring_n, contact_n) in enumerate(self._pull()):
             self._gone_m[axis] += follower.moved_m[axis]
-            channel.x_of_law_m = channel.tick.x_m = x
+            channel.x_of_law_m = x
+            if self.limits.driven:
+                channel.velocity_m_per_s = speed
             channel.push(contact_n, spring_n)
         return True
 

@@ -431,7 +431,7 @@ class PortAxis(Channel):
         """
         self.requested_n += contact_n - self._contact_n
         self.tick.contact_n = self._contact_n = contact_n
-        self.tick.spring_n = self.wall.spring_n = spring_n
+        self.wall.spring_n = spring_n
 
     def apply_scaled(self, share: float, scale: float) -> None:
         """Remember what is applied from now on.

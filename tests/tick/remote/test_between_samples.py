@@ -255,3 +255,51 @@ def test_in_ticks_in_which_no_time_passes_nothing_goes_on() -> None:
     assert list(rig.tick.advance(rig.sample, 0.0)) == pytest.approx([K * OFF_M], abs=FOLLOW_N_PER_S * 6e-9)
     assert rig["tool"].target_m == pytest.approx([OFF_M])
     assert rig.tick.fault == 0
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_law_that_takes_over_between_samples_starts_from_where_the_target_is_by_then(driven: bool) -> None:
+    slow = Slow(COUPLING + COME_IN + f"driven = {str(driven).lower()}\n", [20]).first(position_m=[0.0])
+    slow.to_sample()
+    slow.run(11, position_m=[OFF_M])
+    (channel,) = slow.rig["tool"].channels
+    assert not slow.saw
+    assert slow.rig["tool"].target_m[0] > 0.5 * OFF_M
+    speed_m_per_s = slow.rig["tool"].follower.speed_m_per_s[0] if driven else 0.0
+    start = channel.snapshot()
+    assert (start.x_m, start.velocity_m_per_s) == (-slow.rig["tool"].target_m[0], -speed_m_per_s)
+
+
+def test_one_that_comes_into_force_anew_shows_its_law_no_way_of_before() -> None:
+    shown = []
+
+    def step(_state: Any, _params: Any, tick: Any) -> float:
+        if tick.in_contact:
+            shown.append(tick.moved_m)
+        return float(tick.contact_n)
+
+    slow = Slow(COUPLING + PROMPT + "driven = true\n", [20])
+    module = law(step)
+    (channel,) = slow.rig["tool"].channels
+    channel.law = RunningLaw(module, module.Params())
+    slow.first(position_m=[OFF_M], velocity_m_per_s=[0.1])
+    slow.run(97, position_m=[OFF_M], velocity_m_per_s=[0.1])
+    slow.rig["tool"].take(update(slow.rig.seq + 1, released=True))
+    slow.run(200)
+    before = len(shown)
+    slow.run(40, position_m=[OFF_M], velocity_m_per_s=[0.1])
+    assert (len(shown) - before, shown[before]) == (2, 0.0)
+
+
+def test_what_waited_for_a_sample_that_never_came_is_entered_with_no_other() -> None:
+    """The device was calibrated in between."""
+    slow = Slow(COUPLING + COME_IN, [20]).first(position_m=[OFF_M])
+    slow.run(239, position_m=[OFF_M])
+    slow.to_sample()
+    slow.run(15, position_m=[-OFF_M])
+    books = slow.rig["tool"].books
+    slow.rig.tick.start(slow.rig.sample)
+    before = (books.moved_j, books.carried_j, books.ledger.dissipated_j, books.ledger.generated_j)
+    slow.run(60, position_m=[0.0])
+    assert (books.moved_j, books.carried_j, books.ledger.dissipated_j, books.ledger.generated_j) == before
+    assert before[0] > 1e-3
