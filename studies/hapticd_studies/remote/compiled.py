@@ -29,7 +29,7 @@ from hapticd.simulation.plant import Buffers, move, sense, terms
 from hapticd.simulation.plant.hand import hand_force
 from hapticd_studies.law_spec import LawSpec
 from hapticd_studies.remote.clients import Tool
-from hapticd_studies.remote.kernel import PORT, SEEN, published_damping
+from hapticd_studies.remote.kernel import PORT, SEEN, Found, HeldDevice, PortLaw, Turns, published_damping
 from hapticd_studies.remote.kernel import run as kernel
 from hapticd_studies.remote.network import turns
 from hapticd_studies.remote.runs import DURATION_S, Case, ended
@@ -54,7 +54,7 @@ class CompiledCase:
             hand_n.append(float(hand_force(device.state, device.params, device.buffers)))
             device.state.tick += 1
         self._hand_n = np.array(hand_n)
-        self._listen()
+        self._turns = self._listen()
         limits = port_limits(loaded.config.scene)[0]
         self._port: dict[str, Any] = {
             "spring": case.kind == "tool",
@@ -109,26 +109,24 @@ class CompiledCase:
         seen = records([dict.fromkeys(SEEN, 0.0)], SEEN)
         true_m = np.zeros(self._ticks)
         _machine_code(module, tuple(sorted(_switches(self._options).items())))(
-            records([plant], kinds(plant)),
-            records([plant_params], kinds(plant_params)),
-            np.array(device.buffers.line, float),
-            self._hand_n,
-            records([law_fields], state_fields(module)),
-            records([params], param_kinds(module)),
-            records([tick], TICK_KINDS),
+            HeldDevice(
+                records([plant], kinds(plant)),
+                records([plant_params], kinds(plant_params)),
+                np.array(device.buffers.line, float),
+                self._hand_n,
+            ),
+            PortLaw(
+                records([law_fields], state_fields(module)),
+                records([params], param_kinds(module)),
+                records([tick], TICK_KINDS),
+            ),
             records([port], PORT),
-            self._at_s,
-            self._sees,
-            self._until,
-            self._takes,
-            np.zeros((max(1, len(self._at_s)), 2)),
-            np.zeros((self._ticks, 4)),
-            seen,
-            true_m,
+            self._turns,
+            Found(np.zeros((max(1, len(self._turns.at_s)), 2)), np.zeros((self._ticks, 4)), seen, true_m),
         )
         return true_m, seen[0]
 
-    def _listen(self) -> None:
+    def _listen(self) -> Turns:
         """When each turn is, what it knows, and whose message is in force from which tick on."""
         at_s: list[float] = []
         sees: list[int] = []
@@ -151,8 +149,7 @@ class CompiledCase:
             inbox = [one for one in inbox if one[0] >= now_s]
             if heard and max(heard) > newest:
                 newest = takes[count] = max(heard)
-        self._at_s, self._sees = np.array(at_s, float), np.array(sees, np.int64)
-        self._until, self._takes = np.array(until, np.int64), takes
+        return Turns(np.array(at_s, float), np.array(sees, np.int64), np.array(until, np.int64), takes)
 
 
 @lru_cache
@@ -191,41 +188,14 @@ def _machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> An
     run = compiled(specialise(kernel, {}, calls), {law.step: compiled_step(law)})
 
     @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
-    def one(
-        plant: Any,
-        plant_params: Any,
-        line: Any,
-        hand_n: Any,
-        law_state: Any,
-        law_params: Any,
-        tick: Any,
-        port: Any,
-        at_s: Any,
-        sees: Any,
-        until: Any,
-        takes: Any,
-        said: Any,
-        known: Any,
-        seen: Any,
-        true_m: Any,
-    ) -> None:
+    def one(device: Any, law: Any, port: Any, turns: Any, found: Any) -> None:
+        line = device.buffers
         run(
-            on_stack(plant[0]),
-            on_stack(plant_params[0]),
-            Buffers(line, line, line),
-            hand_n,
-            on_stack(law_state[0]),
-            on_stack(law_params[0]),
-            on_stack(tick[0]),
+            HeldDevice(on_stack(device.state[0]), on_stack(device.params[0]), Buffers(line, line, line), device.hand_n),
+            PortLaw(on_stack(law.state[0]), on_stack(law.params[0]), on_stack(law.tick[0])),
             on_stack(port[0]),
-            at_s,
-            sees,
-            until,
-            takes,
-            said,
-            known,
-            seen[0],
-            true_m,
+            turns,
+            Found(found.said, found.known, found.seen[0], found.true_m),
         )
 
     return one

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import exp, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 from hapticd.simulation.options import FARTHEST_M
 from hapticd.simulation.plant import move, sense
@@ -53,6 +53,41 @@ SEEN = {
 """What a run leaves behind, beside the positions."""
 
 
+class HeldDevice(NamedTuple):
+    """The device and the hand on it."""
+
+    state: Any  # of the device
+    params: Any  # its coefficients
+    buffers: Any  # its delay line
+    hand_n: Any  # force of the hand, by tick [N]
+
+
+class PortLaw(NamedTuple):
+    """The law of the port."""
+
+    state: Any
+    params: Any
+    tick: Any  # what it is shown
+
+
+class Turns(NamedTuple):
+    """The turns of the client, and when the loop hears of them."""
+
+    at_s: Any  # of each turn when it is [s]
+    sees: Any  # which tick it knows
+    until: Any  # by tick how many turns have been at its end
+    takes: Any  # by tick the turn whose message comes into force at its end; -1: none
+
+
+class Found(NamedTuple):
+    """Room for what becomes of a run."""
+
+    said: Any  # by turn what the client says, position and velocity or the force
+    known: Any  # by tick position, impulse, and of the tick before damping and force
+    seen: Any  # fields of `SEEN`
+    true_m: Any  # the true position, by tick [m]
+
+
 def law_step(state: Any, params: Any, tick: Any) -> float:
     """Stands for the law; `specialise` puts the real one here."""
     raise NotImplementedError
@@ -69,44 +104,20 @@ def published_damping(state: Any) -> float:
     return damping
 
 
-def run(
-    plant: Any,
-    plant_params: Any,
-    buffers: Any,
-    hand_n: Any,
-    law_state: Any,
-    law_params: Any,
-    tick: Any,
-    port: Any,
-    at_s: Any,
-    sees: Any,
-    until: Any,
-    takes: Any,
-    said: Any,
-    known: Any,
-    seen: Any,
-    true_m: Any,
-) -> None:
+def run(device: HeldDevice, law: PortLaw, port: Any, turns: Turns, found: Found) -> None:
     """One run.
 
     Args:
-        plant: state of the device.
-        plant_params: its coefficients.
-        buffers: its delay line.
-        hand_n: of the hand, by tick [N].
-        law_state: of the law.
-        law_params: its parameters.
-        tick: what it is shown.
+        device: where it starts.
+        law: where it starts.
         port: fields of `PORT`.
-        at_s: of each turn of the client when it is [s].
-        sees: which tick it knows.
-        until: by tick how many turns have been at its end.
-        takes: by tick the turn whose message comes into force at its end; -1: none.
-        said: room for what each turn says, position and velocity or the force.
-        known: room for position and impulse, by tick.
-        seen: fields of `SEEN`.
-        true_m: room for the true position, by tick.
+        turns: of the client.
+        found: what becomes of it is put here.
     """
+    plant, plant_params, buffers, hand_n = device
+    law_state, law_params, tick = law
+    at_s, sees, until, takes = turns
+    said, known, seen, true_m = found
     period_s = port.period_s
     decay = exp(-HASTE_PER_S * period_s)
     keep = decay * decay
