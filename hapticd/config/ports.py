@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from hapticd.config.models import SceneConfig
+from typing import TYPE_CHECKING
+
 from hapticd.config.objects import HOLD_S, MAX_SPEED_M_PER_S
 from hapticd.config.remote import PortLimits
+
+if TYPE_CHECKING:  # the longest way down is one shorter without it
+    from hapticd.config.models import SceneConfig
 
 __all__ = ["PortLimits", "port_limits"]
 

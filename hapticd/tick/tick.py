@@ -2,7 +2,8 @@
 
 positions -> velocities -> contacts -> laws -> guard -> force; then the books
 
-What may happen between two samples stands in one module, so that the order of it can be read from top to bottom.
+What may happen between two samples stands in one module, so that the order of it can be read from top to bottom: `step`
+is the tick itself, and what it calls now and then follows below.
 """
 
 from __future__ import annotations
@@ -13,29 +14,25 @@ from traceback import walk_tb
 from typing import TYPE_CHECKING
 
 from hapticd.config.models import SceneConfig, VelocityConfig
-from hapticd.config.ports import PortLimits, port_limits
 from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo, Sample
-from hapticd.errors import ConfigError, in_words
+from hapticd.errors import in_words
 from hapticd.tick import fallback
-from hapticd.tick.arrangement import Arrangement, arrange
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
-from hapticd.tick.guard import BLIND_RAMP_S, Guard, Mode, let_out, limits
+from hapticd.tick.guard import Guard, Mode, limits
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.port import Port
-from hapticd.tick.remote.ports import PortArrangement, arrange_ports, axes_of
+from hapticd.tick.remote.tick_ports import MakePort, TickPorts
 from hapticd.tick.scene import check_objects, compile_walls
+from hapticd.tick.sight import Sight
 from hapticd.tick.space.books import Totals
+from hapticd.tick.switch import Switch
 
 if TYPE_CHECKING:  # what a scene without couplings and forces never loads
-    from hapticd.tick.remote.one_port import OnePort, PortAxis
-
-MakePort = Callable[[PortLimits, Motion, float, float], "OnePort"]
-"""Makes a coupling or a force: its limits, where the device is, the device's resolution [m], the duration of its ramps
-[s]."""
+    from hapticd.tick.remote.one_port import OnePort
 
 _IMPOSSIBLE = "the device reported a position that is not possible"
 _LOST = "the device does not know any more where it is"
@@ -59,6 +56,7 @@ class ControlTick:
 
     Attributes:
         motion: where the device is and how fast, as used by the last tick.
+        sight: whether that is known.
         contacts: one a wall, in scene order.
         leaving: walls that are gone and whose force still fades out.
         past: books of the walls that are gone, so that the sums over all walls never jump.
@@ -69,7 +67,6 @@ class ControlTick:
         advance: what a loop calls each tick: `step`, or what else a scene needs.
         has_objects: whether the scene has objects in space.
         ports: what clients drive, in scene order: objects, couplings, forces.
-        couplings: of these the ones that pull by themselves, couplings and forces.
         has_ports: whether there are such, or were.
 
     Raises:
@@ -91,6 +88,7 @@ class ControlTick:
         axes = len(info.axes)
         self.info = info
         self.motion = Motion(velocity, info, period_s)
+        self.sight = Sight(axes)
         self.guard = guard
         self.period_s = period_s
         self.ramp_s = ramp_s
@@ -108,18 +106,9 @@ class ControlTick:
         self._last_fault = 0
         self._axes = range(axes)
         self._simulated = info.simulated
-        self._make_port = make_port
-        self.couplings: list[OnePort] = [self._port(port) for port in port_limits(scene) if port.kind != "object"]
-        self.leaving_ports: list[OnePort] = []
-        self.past_ports = Totals()
-        for port in self.couplings:
-            port.join()
+        self._own_ports = TickPorts(scene, make_port, self.motion, info.resolution_m, ramp_s)
         self._gather()
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
-        self._blind = self._calibrated = True
-        self._excused = False
-        self._blind_gain = 0.0
-        self._blind_from_n = [0.0] * axes
         self.motion.watch_speed(guard.max_speed_m_per_s < math.inf)
         self.ports: list[Port]
         self.advance: Callable[[Sample, float], list[float]] = self.step
@@ -128,6 +117,11 @@ class ControlTick:
     def ramp_ticks(self) -> int:
         """Ticks that a ramp takes where none is late."""
         return max(1, round(self.ramp_s / self.period_s))
+
+    @property
+    def couplings(self) -> list[OnePort]:
+        """Of the ports the ones that pull by themselves, couplings and forces."""
+        return self._own_ports.couplings
 
     @property
     def flags(self) -> int:
@@ -148,166 +142,11 @@ class ControlTick:
         Raises:
             PluginError: the law cannot start.
         """
-        self._blind = not self.motion.start(sample)
-        self._calibrated = sample.calibrated
-        self._excused = not sample.calibrated
-        if self._blind and sample.calibrated:
+        self.sight.start(self.motion.start(sample), sample.calibrated)
+        if self.sight.blind and sample.calibrated:
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
         self._stand()
-        self._start_laws([(contact, contact.law) for contact in (*self._under_law(), *self._axes_under_law())])
-
-    def arm(self) -> bool:
-        """Let forces through; a wall that is already pressed comes in by a ramp. False while latched.
-
-        Raises:
-            PluginError: the law cannot start; nothing has changed then.
-        """
-        if self.guard.mode is Mode.ARMED:
-            return True
-        if self.guard.latched:
-            return False
-        fresh = [(contact, self.make_law()) for contact in self._under_law()]
-        fresh += [(axis, axis.make_law()) for axis in self._axes_under_law()]
-        laws = self._start_laws(fresh)
-        self.guard.arm()
-        self.fallback = False
-        for contact, law in laws:
-            self._take_law(contact, law)
-        for contact in self._fading_out():
-            self._blend(contact)
-        return True
-
-    def tare(self) -> bool:
-        """Count positions from here on. False while forces are let through or it is not known where the device is."""
-        if self._blind or not self._calibrated or self.guard.mode is not Mode.DISARMED:
-            return False
-        motion = self.motion
-        self._move_origin([origin + at for origin, at in zip(motion.origin_m, motion.position_m, strict=True)])
-        return True
-
-    def forget_origin(self) -> None:
-        """Count positions as the device does, for one that is disarmed."""
-        self._move_origin([0.0 for _ in self._axes])
-
-    def switch(
-        self,
-        scene: SceneConfig | None = None,
-        safety: SafetyConfig | None = None,
-        make_law: Callable[[], RunningLaw] | None = None,
-    ) -> Generator[None, None, None]:
-        """Take another scene, other limits, another law: all or nothing, and without a step in force.
-
-        It is made ready a slice at a time, and ticks may go on in between; what comes after the last takes it.
-
-        A wall that did not change keeps its clock, law and books; one that changed in place keeps law and books; one
-        that is gone fades out. Another law is put on every wall, but not in the place of the fallback, and
-        not on couplings and forces, which have a law of their own.
-
-        Raises:
-            ConfigError: the scene or the limits do not fit the device; nothing has changed then.
-            PluginError: the law cannot start; nothing has changed then.
-        """
-        return self._switch(scene, safety, make_law, lambda: None)
-
-    def _switch(
-        self,
-        scene: SceneConfig | None,
-        safety: SafetyConfig | None,
-        make_law: Callable[[], RunningLaw] | None,
-        start_more: Callable[[], object],
-    ) -> Generator[None, None, None]:
-        """The same; laws of what is beside walls, couplings and forces start with theirs, in the tick that takes it."""
-        if safety is not None:
-            limits(safety, self.info)
-        make = self.make_law if make_law is None else make_law
-        there = Arrangement(self.contacts)
-        ports = PortArrangement(self.couplings)
-        if scene is not None:
-            check_objects(scene.objects, self.info)
-            walls = compile_walls(scene.walls, self.info, self.period_s)
-            yield
-            there = yield from arrange(walls, self.contacts, self.info, make)
-            ports = yield from arrange_ports(scene, self.couplings, self._port)
-        new: list[Contact] = [*there.new, *axes_of(ports.new)]
-        laws = [(contact, contact.law) for contact in new]
-        turned = axes_of(ports.turned)
-        laws += [(axis, axis.make_law()) for axis in turned]
-        if make_law is not None:
-            for contact in there.contacts:
-                if contact not in there.new:
-                    laws.append((contact, make()))
-                    yield
-        gone = []
-        for contact in [each for each in self.contacts if each not in there.contacts]:  # a blend takes their force
-            gone.append((contact, RunningLaw(fallback, fallback.Params(damping_n_s_per_m=0.0))))
-            yield
-        for contact in there.new:
-            contact.start(self.motion.position_m[contact.wall.axis])
-        self._start_laws(laws)
-        start_more()
-        # From here on nothing can fail.
-        self.make_law = make
-        if safety is not None:
-            self.guard.configure(safety, self.info, self.force_n)
-            self.motion.watch_speed(self.guard.max_speed_m_per_s < math.inf)
-            self.ramp_s = safety.ramp_s
-        for contact, law in gone:
-            contact.wall.let_go()
-            self.leaving.append(contact)
-            self._take_law(contact, law)
-        for contact, wall in there.changed:
-            contact.wall = wall
-            self._blend(contact)
-        self.contacts = there.contacts
-        self._take_ports(ports)
-        self._changing = any(contact.wall.changes_left for contact in self.contacts)
-        if self.fallback:
-            laws = self._start_laws([(contact, self._fallback_law()) for contact in (*new, *turned)])
-        for contact, law in laws:
-            self._take_law(contact, law)
-        if self.guard.limited:  # who goes on would take a larger share of the limit at once
-            for contact in self._active:
-                self._blend(contact)
-
-    def totals(self) -> Totals:
-        """The books of all that there ever was."""
-        totals = Totals()
-        self.add_totals(totals)
-        return totals
-
-    def add_totals(self, totals: Totals) -> None:
-        """Add the books of all walls, couplings and forces there ever were."""
-        totals.ledger.absorb(self.past)
-        for contact in (*self.contacts, *self.leaving):
-            totals.ledger.absorb(contact.ledger)
-        totals.add(self.past_ports)
-        for port in (*self.couplings, *self.leaving_ports):
-            totals.add_moving(port.books)
-
-    def port_work_j(self) -> float:
-        """What the clients of all couplings and forces there ever were have put in [J]."""
-        ports = (*self.couplings, *self.leaving_ports)
-        return self.past_ports.moved_j + sum([port.books.moved_j for port in ports])
-
-    def release(self, ramp_s: float | None = None) -> None:
-        """Ramp the force to zero and stay disarmed."""
-        self.guard.release(self.ramp_s if ramp_s is None else ramp_s)
-
-    def fail(self, code: EventCode, text: str) -> None:
-        """Stop because of a fault: ramp the force to zero and latch. The same fault is reported once until cleared."""
-        if not self.fault and not (self.guard.latched and code == self._last_fault):
-            self.fault = self._last_fault = code
-            self.fault_text = text
-        self.guard.release(self.ramp_s, latch=True)
-
-    def fail_law(self, code: EventCode, text: str) -> None:
-        """Put the damping fallback in the place of every law, and stop."""
-        if not self.fallback:
-            self.fallback = True
-            failing = (*self._under_law(), *self._axes_under_law())
-            for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in failing]):
-                self._take_law(contact, law)
-        self.fail(code, text)
+        self._start_laws([(contact, contact.law) for contact in (*self._under_law(), *self._own_ports.axes)])
 
     def step(self, sample: Sample, clock_dt_s: float) -> list[float]:
         """One tick.
@@ -327,11 +166,12 @@ class ControlTick:
         """
         motion = self.motion
         guard = self.guard
+        sight = self.sight
         passed_s, periods = self.period_s, 1.0
         if not self._simulated:
             passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
             periods = passed_s / self.period_s
-        seen = motion.see(sample, clock_dt_s, passed_s, self._blind)
+        seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
             self._change_walls(periods)
         if guard.mode is not _DISARMED:
@@ -344,9 +184,9 @@ class ControlTick:
             elif seen and motion.watches_speed:
                 self._check_speed()
         else:
-            self._calibrated = sample.calibrated
-        if not seen or self._blind:
-            if not seen or self._blind_gain > 0.0:
+            sight.calibrated = sample.calibrated
+        if not seen or sight.blind:
+            if not seen or sight.gain > 0.0:
                 return self._step_blind(sample.calibrated, passed_s)
             self._see_again()
         position_m = motion.position_m
@@ -391,56 +231,95 @@ class ControlTick:
             self._drop_gone()
         return force_n
 
-    def _under_law(self) -> list[Contact]:
-        return self.contacts  # all that have a law of [controller]
+    def arm(self) -> bool:
+        """Let forces through; a wall that is already pressed comes in by a ramp. False while latched.
 
-    def _fading_out(self) -> list[Contact]:
-        return self.leaving  # all that hold what is left of a force
+        Raises:
+            PluginError: the law cannot start; nothing has changed then.
+        """
+        if self.guard.mode is Mode.ARMED:
+            return True
+        if self.guard.latched:
+            return False
+        fresh = [(contact, self.make_law()) for contact in self._under_law()]
+        fresh += [(axis, axis.make_law()) for axis in self._own_ports.axes]
+        laws = self._start_laws(fresh)
+        self.guard.arm()
+        self.fallback = False
+        for contact, law in laws:
+            self._take_law(contact, law)
+        for contact in self._fading_out():
+            self._blend(contact)
+        return True
 
-    def _axes_under_law(self) -> list[PortAxis]:
-        return axes_of([*self.couplings, *self.leaving_ports])  # all that have a law of [remote]
+    def release(self, ramp_s: float | None = None) -> None:
+        """Ramp the force to zero and stay disarmed."""
+        self.guard.release(self.ramp_s if ramp_s is None else ramp_s)
 
-    def _port(self, limits: PortLimits) -> OnePort:
-        if self._make_port is None:
-            raise ConfigError(f'"{limits.name}": this tick has no {limits.kind}s')
-        return self._make_port(limits, self.motion, self.info.resolution_m, self.ramp_s)
+    def tare(self) -> bool:
+        """Count positions from here on. False while forces are let through or it is not known where the device is."""
+        if self.sight.blind or not self.sight.calibrated or self.guard.mode is not Mode.DISARMED:
+            return False
+        motion = self.motion
+        self._move_origin([origin + at for origin, at in zip(motion.origin_m, motion.position_m, strict=True)])
+        return True
 
-    def _take_ports(self, arrangement: PortArrangement) -> None:
-        """Go on with other ports; of those that were gone before, the ones that have let go leave the books."""
-        arrangement.take()
-        for port in [port for port in self.leaving_ports if port.asleep]:
-            self.past_ports.add_moving(port.books)
-            self.leaving_ports.remove(port)
-            port.part()
-        self.leaving_ports += arrangement.gone
-        self.couplings = arrangement.ports
-        for port in self.couplings:
-            port.set_ramp(self.ramp_s)
-        self._gather()
+    def forget_origin(self) -> None:
+        """Count positions as the device does, for one that is disarmed."""
+        self._move_origin([0.0 for _ in self._axes])
 
-    def _gather(self) -> None:
-        """Make the lists that the ticks go through."""
-        self._active = [*self.contacts, *self.leaving, *axes_of(self.couplings), *axes_of(self.leaving_ports)]
-        self.ports = list(self.couplings)
-        self.has_ports = self.has_ports or bool(self.ports)  # and their books once they are gone
+    def switch(
+        self,
+        scene: SceneConfig | None = None,
+        safety: SafetyConfig | None = None,
+        make_law: Callable[[], RunningLaw] | None = None,
+    ) -> Generator[None, None, None]:
+        """Take another scene, other limits, another law: all or nothing, and without a step in force.
 
-    def _move_origin(self, origin_m: list[float]) -> None:
-        self.motion.move_origin(origin_m)
-        self._stand()
+        It is made ready a slice at a time, and ticks may go on in between; what comes after the last takes it.
 
-    def _stand(self) -> None:
-        """Be where the device is now, at rest and without force."""
-        for contact in self._active:
-            contact.start(self.motion.position_m[contact.wall.axis])
+        A wall that did not change keeps its clock, law and books; one that changed in place keeps law and books; one
+        that is gone fades out. Another law is put on every wall, but not in the place of the fallback, and
+        not on couplings and forces, which have a law of their own.
 
-    def _fallback_law(self) -> RunningLaw:
-        return RunningLaw(fallback, fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m))
+        Raises:
+            ConfigError: the scene or the limits do not fit the device; nothing has changed then.
+            PluginError: the law cannot start; nothing has changed then.
+        """
+        return self._switch(scene, safety, make_law, lambda: None)
 
-    def _check_speed(self) -> None:
-        limit = self.guard.max_speed_m_per_s
-        if self.motion.speed_squared > limit * limit and self.guard.mode is _ARMED:
-            speed = math.sqrt(self.motion.speed_squared)
-            self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
+    def fail(self, code: EventCode, text: str) -> None:
+        """Stop because of a fault: ramp the force to zero and latch. The same fault is reported once until cleared."""
+        if not self.fault and not (self.guard.latched and code == self._last_fault):
+            self.fault = self._last_fault = code
+            self.fault_text = text
+        self.guard.release(self.ramp_s, latch=True)
+
+    def fail_law(self, code: EventCode, text: str) -> None:
+        """Put the damping fallback in the place of every law, and stop."""
+        if not self.fallback:
+            self.fallback = True
+            failing = (*self._under_law(), *self._own_ports.axes)
+            for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in failing]):
+                self._take_law(contact, law)
+        self.fail(code, text)
+
+    def totals(self) -> Totals:
+        """The books of all that there ever was."""
+        totals = Totals()
+        self.add_totals(totals)
+        return totals
+
+    def add_totals(self, totals: Totals) -> None:
+        """Add the books of all walls, couplings and forces there ever were."""
+        totals.ledger.absorb(self.past)
+        for contact in (*self.contacts, *self.leaving):
+            totals.ledger.absorb(contact.ledger)
+        self._own_ports.add_totals(totals)
+
+    def port_work_j(self) -> float:
+        """What the clients of all couplings and forces there ever were have put in [J]."""
+        return self._own_ports.work_j()
 
     def _change_walls(self, periods: float) -> None:
         """Bring changes of walls into force whose time has come: on a real device by a ramp."""
@@ -453,6 +332,31 @@ class ControlTick:
                 if wall.changes_left:
                     self._changing = True
 
+    def _check_speed(self) -> None:
+        limit = self.guard.max_speed_m_per_s
+        if self.motion.speed_squared > limit * limit and self.guard.mode is _ARMED:
+            speed = math.sqrt(self.motion.speed_squared)
+            self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
+
+    def _step_blind(self, calibrated: bool, passed_s: float) -> list[float]:
+        """Let the last force out quickly, and be disarmed then."""
+        sight = self.sight
+        if self.guard.mode is Mode.ARMED or sight.is_fault(calibrated):
+            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE if calibrated else _LOST)
+        sight.let_out(self.force_n, calibrated, passed_s)
+        if sight.gain == 0.0:
+            self.guard.drop()
+        for axis in self._axes:
+            self.requested_n[axis] = 0.0
+        return self.force_n
+
+    def _see_again(self) -> None:
+        """Positions make sense again: stand there, at rest and without force; if armed by then, come in by a ramp."""
+        self.sight.blind = False
+        self._stand()
+        for contact in self._active:
+            self._blend(contact)
+
     def _replace_laws(self, contact: Contact, error: BaseException, periods: float) -> None:
         """A law raised or returned nonsense: all are replaced, and asked again."""
         frames = {frame.f_globals.get("__name__") for frame, _ in walk_tb(error.__traceback__)}
@@ -462,34 +366,85 @@ class ControlTick:
         for each in self._active:
             each.act(periods)
 
-    def _step_blind(self, calibrated: bool, passed_s: float) -> list[float]:
-        """Let the last force out quickly: without a position there is no wall.
+    def _drop_gone(self) -> None:
+        """Close the books of walls whose force has faded out."""
+        for contact in [each for each in self.leaving if not each.blending and each.applied_n == 0.0]:
+            self.past.absorb(contact.ledger)
+            self.leaving.remove(contact)
+            self._active.remove(contact)
 
-        That a device which is not calibrated does not know where it is is no fault as long as it has no force.
-        """
-        force_n = self.force_n
-        guard = self.guard
-        if guard.mode is Mode.ARMED or (calibrated and (self._excused or not self._blind)):
-            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE if calibrated else _LOST)
-        self._excused = not calibrated
-        if not self._blind:
-            self._blind = True
-            self._blind_gain = 1.0
-            self._blind_from_n = list(force_n)
-        self._blind_gain = let_out(self._blind_gain, BLIND_RAMP_S, passed_s)
-        if self._blind_gain == 0.0:
-            guard.drop()
-        for axis in self._axes:
-            force_n[axis] = self._blind_gain * self._blind_from_n[axis]
-            self.requested_n[axis] = 0.0
-        return force_n
+    def _switch(
+        self,
+        scene: SceneConfig | None,
+        safety: SafetyConfig | None,
+        make_law: Callable[[], RunningLaw] | None,
+        start_more: Callable[[], object],
+    ) -> Generator[None, None, None]:
+        """The same; laws of what is beside walls, couplings and forces start with theirs, in the tick that takes it."""
+        if safety is not None:
+            limits(safety, self.info)
+        make = self.make_law if make_law is None else make_law
+        switch = Switch(self.contacts, self._own_ports)
+        if scene is not None:
+            yield from switch.to_scene(scene, self.info, self.period_s, self.ramp_s, make)
+        if make_law is not None:
+            yield from switch.to_law(make_law)
+        for contact in switch.walls.new:
+            contact.start(self.motion.position_m[contact.wall.axis])
+        self._start_laws(switch.laws)
+        start_more()
+        self.make_law = make
+        self._take(switch, safety)
 
-    def _see_again(self) -> None:
-        """Positions make sense again: stand there, at rest and without force; if armed by then, come in by a ramp."""
-        self._blind = False
-        self._stand()
-        for contact in self._active:
+    def _take(self, switch: Switch, safety: SafetyConfig | None) -> None:
+        """Go on with what has been made ready and started; nothing can fail from here on."""
+        if safety is not None:
+            self.guard.configure(safety, self.info, self.force_n)
+            self.motion.watch_speed(self.guard.max_speed_m_per_s < math.inf)
+            self.ramp_s = safety.ramp_s
+        for contact, law in switch.gone:
+            contact.wall.let_go()
+            self.leaving.append(contact)
+            self._take_law(contact, law)
+        for contact, wall in switch.walls.changed:
+            contact.wall = wall
             self._blend(contact)
+        self.contacts = switch.walls.contacts
+        self._own_ports.take(switch.ports, self.ramp_s)
+        self._gather()
+        self._changing = any(contact.wall.changes_left for contact in self.contacts)
+        laws = switch.laws
+        if self.fallback:
+            laws = self._start_laws([(contact, self._fallback_law()) for contact in switch.fresh])
+        for contact, law in laws:
+            self._take_law(contact, law)
+        if self.guard.limited:  # who goes on would take a larger share of the limit at once
+            for contact in self._active:
+                self._blend(contact)
+
+    def _gather(self) -> None:
+        """Make the lists that the ticks go through."""
+        self._active = [*self.contacts, *self.leaving, *self._own_ports.axes]
+        self.ports = list(self.couplings)
+        self.has_ports = self.has_ports or bool(self.ports)  # and their books once they are gone
+
+    def _under_law(self) -> list[Contact]:
+        return self.contacts  # all that have a law of [controller]
+
+    def _fading_out(self) -> list[Contact]:
+        return self.leaving  # all that hold what is left of a force
+
+    def _move_origin(self, origin_m: list[float]) -> None:
+        self.motion.move_origin(origin_m)
+        self._stand()
+
+    def _stand(self) -> None:
+        """Be where the device is now, at rest and without force."""
+        for contact in self._active:
+            contact.start(self.motion.position_m[contact.wall.axis])
+
+    def _fallback_law(self) -> RunningLaw:
+        return RunningLaw(fallback, fallback.Params(damping_n_s_per_m=self.info.safe_damping_n_s_per_m))
 
     def _start_laws(self, laws: list[tuple[Contact, RunningLaw]]) -> list[tuple[Contact, RunningLaw]]:
         """Start each law where its contact is now, and hand them back; nothing else has changed yet."""
@@ -506,10 +461,3 @@ class ControlTick:
 
     def _blend(self, contact: Contact) -> None:
         contact.blend(self.ramp_ticks, self.guard.gain, self.guard.limit_n)
-
-    def _drop_gone(self) -> None:
-        """Close the books of walls whose force has faded out."""
-        for contact in [each for each in self.leaving if not each.blending and each.applied_n == 0.0]:
-            self.past.absorb(contact.ledger)
-            self.leaving.remove(contact)
-            self._active.remove(contact)

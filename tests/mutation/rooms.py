@@ -65,7 +65,7 @@ ROOMS = {
     "tick": Room(
         tuple(
             f"hapticd/tick/{name}.py"
-            for name in ("tick", "contact", "motion", "arrangement", "assemble", "fallback")
+            for name in ("tick", "sight", "contact", "motion", "switch", "assemble", "fallback")
         ),
         ("tests/tick", RUNS),
     ),
@@ -91,7 +91,7 @@ ROOMS = {
             f"hapticd/tick/remote/{name}.py"
             for name in (
                 "books", "coupling", "follower", "line", "one_port", "port", "port_state", "ports", "ramped",
-                "port_site", "remote_object", "streamed_force", "turning", "update",
+                "port_site", "remote_object", "streamed_force", "tick_ports", "turning", "update",
             )
         ),
         ("tests/tick/remote", RUNS),

@@ -46,7 +46,7 @@ APART = {
         "if not self._simulated:": "time on a real device; tests/tick/test_tick_time.py",
         "waiting.hold(periods)": "a simulated device does not repeat a sample",
         "self._see_again()": "after a position that was not possible the kernel has ended",
-        "if not seen or self._blind_gain > 0.0:": "the same",
+        "if not seen or sight.gain > 0.0:": "the same",
         "if self.leaving:": "walls that are gone: the kernel's stays",
         "except KeyboardInterrupt:": "nobody presses Ctrl-C",
     },
@@ -125,7 +125,7 @@ EQUAL: dict[str, dict[str, tuple[str, ...]]] = {
         "ControlTick.step: if dt_s > 0.0:": (
             "Gt 0 is GtE", "without contacts = self._active", "without for waiting in contacts:",
         ),
-        "ControlTick.step: seen = motion.see(sample, clock_dt_s, passed_s, self._blind)": ("clock_dt_s one later",),
+        "ControlTick.step: seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)": ("clock_dt_s one later",),
         "Contact.settle: if dt_s > 0.0 and (touched or self._touched):": ("Gt 0 is GtE",),
         "Contact.observe: def observe(self, x_m, velocity_m_per_s, dt_s):": ("without tick.dt_s = dt_s",),
     },

@@ -41,7 +41,7 @@ def interpreted_because(tick: SpaceTick, device: SpatialDevice) -> str:
         return "a blend that is under way"
     if any(each.changing for each in device.axes):
         return "device.options.changes"
-    if guard.mode is not Mode.ARMED or guard._changing or tick.fallback or tick._fading or tick._blind:
+    if guard.mode is not Mode.ARMED or guard._changing or tick.fallback or tick._fading or tick.sight.blind:
         return "a run that does not begin armed"
     return ""
 

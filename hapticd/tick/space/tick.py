@@ -13,15 +13,16 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.errors import ConfigError
 from hapticd.shapes.pose import Vector
 from hapticd.shapes.reach import Nearby
-from hapticd.tick import fallback
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Guard, Mode
+from hapticd.tick.remote.tick_ports import MakePort
 from hapticd.tick.space.books import SpaceBooks, Totals
 from hapticd.tick.space.channel import Channel
 from hapticd.tick.space.solid import Solid, at_once, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
-from hapticd.tick.tick import ControlTick, MakePort
+from hapticd.tick.switch import no_law
+from hapticd.tick.tick import ControlTick
 
 if TYPE_CHECKING:  # what a scene without remote objects never loads
     from hapticd.tick.remote.remote_object import RemoteContact
@@ -194,11 +195,12 @@ class SpaceTick(ControlTick):
         """
         motion = self.motion
         guard = self.guard
+        sight = self.sight
         passed_s, periods = self.period_s, 1.0
         if not self._simulated:
             passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
             periods = passed_s / self.period_s
-        seen = motion.see(sample, clock_dt_s, passed_s, self._blind)
+        seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
             self._change_walls(periods)
         if guard.mode is not _DISARMED:
@@ -211,9 +213,9 @@ class SpaceTick(ControlTick):
             elif seen and motion.watches_speed:
                 self._check_speed()
         else:
-            self._calibrated = sample.calibrated
-        if not seen or self._blind:
-            if not seen or self._blind_gain > 0.0:
+            sight.calibrated = sample.calibrated
+        if not seen or sight.blind:
+            if not seen or sight.gain > 0.0:
                 return self._step_blind(sample.calibrated, passed_s)
             self._see_again()
         position_m = motion.position_m
@@ -343,7 +345,7 @@ class SpaceTick(ControlTick):
 
     def _fade(self, contact: SolidContact) -> None:
         """Have what a contact applies fade out beside it."""
-        shade = contact.shade(_no_law)
+        shade = contact.shade(no_law)
         self._fading.append(shade)
         self._held.append(shade)  # also at a tick without a new sample
         for channel in shade.channels:
@@ -370,9 +372,5 @@ def _places(solids: Iterable[SolidContact]) -> list[tuple[object, ...]]:
     return [(contact.solid.name, contact.moves, contact.solid.members) for contact in solids]
 
 
-def _no_law() -> RunningLaw:
-    return RunningLaw(fallback, fallback.Params(damping_n_s_per_m=0.0))
-
-
 def _still(channels: Iterable[Contact]) -> list[tuple[Contact, RunningLaw]]:
-    return [(channel, _no_law()) for channel in channels]
+    return [(channel, no_law()) for channel in channels]
