@@ -10,6 +10,7 @@ from hapticd.config.models import LoopConfig
 from hapticd.config.safety import SafetyConfig
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError, in_words
+from hapticd.loop.law_budget import BUDGET_MISSES, BUDGET_TICKS, LawBudget
 from hapticd.loop.memory import (
     ANSWERED,
     DISARM,
@@ -27,14 +28,6 @@ from hapticd.loop.session import Session
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
 from hapticd.tick.tick import ControlTick
-
-BUDGET_TICKS = 10
-BUDGET_MISSES = 3
-"""A law fails when this many of `BUDGET_TICKS` ticks computed for longer than the budget, after one that took longer.
-
-What a tick has computed is a question to the system, which costs more than a small law. It is asked from the first tick
-on that took longer, for whatever reason, and until `BUDGET_TICKS` in a row did not.
-"""
 
 STOP_RAMP_S = 0.05
 """Longest ramp to zero at a stop [s]: what killed the supervisor may not wait for more."""
@@ -142,10 +135,8 @@ class ControlLoop:
         disarmed = Mode.DISARMED
         enabled = DriverState.ENABLED
         budget_ns = int(self._loop.law_budget * period_ns)
-        all_ticks = (1 << BUDGET_TICKS) - 1
-        watched = 0
+        budget = LawBudget(budget_ns)
         most_late = max(BURST_TICKS, int(LATE_S * 1e9) // period_ns)
-        misses = 0
         late = 0
         skipped = session.skipped
         area = shared.record_area
@@ -157,7 +148,6 @@ class ControlLoop:
         # Deadlines are whole multiples of the period, so that an outside witness can share them.
         deadline_ns = monotonic_ns() // period_ns * period_ns + 2 * period_ns
         last_ns = deadline_ns - period_ns
-        cpu_ns = 0
         while True:
             woke_ns = wait(deadline_ns)
             session.deadline_ns = deadline_ns
@@ -198,7 +188,7 @@ class ControlLoop:
                 used_ns = thread_time_ns()
                 requests.work()
                 wait = self._waiting()
-                cpu_ns += thread_time_ns() - used_ns  # a law does not answer for what was asked for
+                budget.excuse(thread_time_ns() - used_ns)  # a law does not answer for what was asked for
             if session.stop_requested and not self._stopping:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
@@ -235,22 +225,14 @@ class ControlLoop:
             elif late:
                 late -= 1
 
-            if watched or now_ns - woke_ns > budget_ns:
-                over = now_ns - woke_ns > budget_ns
-                used_ns = thread_time_ns()
-                misses = misses << 1 & all_ticks
-                # Getting in and out of the sleep costs processor time as well, and is not the law's.
-                if watched and over and used_ns - cpu_ns > budget_ns:
-                    misses |= 1
-                    if misses.bit_count() >= BUDGET_MISSES:
-                        tick.fail_law(
-                            EventCode.LAW_OVER_BUDGET,
-                            f"the tick computed for more than {budget_ns * 1e-3:.0f} us in {BUDGET_MISSES} of "
-                            f"{BUDGET_TICKS} ticks",
-                        )
-                        session.report_fault()
-                cpu_ns = used_ns
-                watched = BUDGET_TICKS if over else watched - 1
+            took_ns = now_ns - woke_ns
+            if (budget.watched or took_ns > budget_ns) and budget.is_exceeded(took_ns, thread_time_ns()):
+                tick.fail_law(
+                    EventCode.LAW_OVER_BUDGET,
+                    f"the tick computed for more than {budget_ns * 1e-3:.0f} us in {BUDGET_MISSES} of {BUDGET_TICKS} "
+                    "ticks",
+                )
+                session.report_fault()
 
     def _waiting(self) -> Callable[[int], int]:
         """How to wait for a deadline: where clients drive something, with a look at what they have said until then."""

@@ -7,7 +7,7 @@ from collections.abc import Collection
 import pytest
 
 from hapticd.config.models import LoopConfig
-from hapticd.loop.loop import BUDGET_MISSES, BUDGET_TICKS
+from hapticd.loop.law_budget import BUDGET_MISSES, BUDGET_TICKS
 from hapticd.loop.memory import SUPERVISOR_BEAT
 from hapticd.tick.event import EventCode
 from tests.loop.clock import Clock

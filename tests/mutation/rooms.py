@@ -114,7 +114,10 @@ ROOMS = {
         (*_tick("scene", "wall_changes", "switching", "tick_transitions"), "tests/tick/space/test_changes.py", RUNS),
     ),
     "loop": Room(
-        tuple(f"hapticd/loop/{name}.py" for name in ("loop", "session", "requests", "memory", "resume", "worker")),
+        tuple(
+            f"hapticd/loop/{name}.py"
+            for name in ("loop", "law_budget", "session", "requests", "memory", "resume", "worker")
+        ),
         tuple(
             f"tests/loop/test_{name}.py"
             for name in (
