@@ -35,9 +35,6 @@ class Nearby:
 
     def look(self, x: float, y: float, z: float) -> list[int]:
         """Indices of the solids in reach or touched, from here on until `moved_out`."""
-        self._x = x
-        self._y = y
-        self._z = z
         found = []
         least_m = 1e3
         for at, proxy in enumerate(self._proxies):
@@ -46,8 +43,15 @@ class Nearby:
                 found.append(at)
             elif free_m < least_m:
                 least_m = free_m
-        self._free_m2 = least_m * least_m
+        self.stay(x, y, z, least_m)
         return found
+
+    def stay(self, x: float, y: float, z: float, least_m: float) -> None:
+        """Take what is in reach here for what is in reach within a ball, of a radius [m], from now on."""
+        self._x = x
+        self._y = y
+        self._z = z
+        self._free_m2 = least_m * least_m
 
 
 def slack_m(proxy: Proxy, x: float, y: float, z: float) -> float:

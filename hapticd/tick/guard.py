@@ -130,6 +130,7 @@ class Guard:
         limit_n: the smaller one, largest force of a single contact [N].
         max_speed_m_per_s: over-speed stop [m/s]; `inf` in simulation.
         limited: whether the last force was reduced by a limit.
+        changing: a limit or the gain is on its way.
 
     Raises:
         ConfigError: the simulation profile on a real device, or a limit above the device's own.
@@ -138,11 +139,11 @@ class Guard:
     __slots__ = (
         "_axis_goal_n",
         "_axis_rate",
-        "_changing",
         "_force_goal_n",
         "_force_rate",
         "_max_squared",
         "_ramp_s",
+        "changing",
         "gain",
         "latched",
         "limit_n",
@@ -198,7 +199,7 @@ class Guard:
         if self.mode is Mode.ARMED:
             self.mode = Mode.RELEASING
             self._ramp_s = ramp_s
-            self._changing = True
+            self.changing = True
         elif self.mode is Mode.RELEASING:
             self._ramp_s = min(self._ramp_s, ramp_s)
 
@@ -207,7 +208,7 @@ class Guard:
         self.mode = Mode.DISARMED
         self.gain = 0.0
         self.limited = False
-        self._changing = True
+        self.changing = True
 
     def clear(self) -> None:
         """Forget the fault; the device stays disarmed until armed."""
@@ -225,7 +226,7 @@ class Guard:
         Returns:
             The share that is left, 0 to 1, the same for every axis and contact.
         """
-        if self._changing:
+        if self.changing:
             self._change(dt_s)
         share = 1.0
         squared = 0.0
@@ -259,7 +260,7 @@ class Guard:
         self._force_rate = _rate(self.max_force_n, goal_n, ramp_s)
         self._axis_rate = _rate(self.max_axis_n, goal_axis_n, ramp_s)
         self._take_limits()
-        self._changing = True
+        self.changing = True
 
     def _take_limits(self) -> None:
         self.limit_n = min(self.max_force_n, self.max_axis_n)
@@ -280,7 +281,7 @@ class Guard:
             self.gain = let_out(self.gain, self._ramp_s, dt_s)
             if self.gain == 0.0:
                 self.drop()
-        self._changing = moving or self.mode is Mode.RELEASING
+        self.changing = moving or self.mode is Mode.RELEASING
 
 
 def let_out(gain: float, ramp_s: float, dt_s: float) -> float:

@@ -49,6 +49,8 @@ class Motion:
         origin_m: where the device places the point that positions count from, one element an axis [m].
         repeated: how many samples in a row came with the device time or count of the one before.
         repeated_s: for how long they have come [s].
+        time_ns: when the device took the last sample, on its own clock where it has one [ns].
+        estimators: of velocity, one an axis.
 
     Raises:
         ConfigError: velocity is to come from a device that does not measure it, or from more samples than can be
@@ -59,21 +61,21 @@ class Motion:
         "_axes",
         "_bounds_m",
         "_differences",
-        "_estimators",
         "_filtered",
         "_frozen_s",
         "_has_clock",
         "_has_sequence",
         "_period_s",
         "_sequence",
-        "_time_ns",
         "_waited_s",
         "dt_s",
+        "estimators",
         "origin_m",
         "position_m",
         "repeated",
         "repeated_s",
         "speed_squared",
+        "time_ns",
         "velocity_m_per_s",
         "watches_speed",
     )
@@ -97,11 +99,11 @@ class Motion:
         self.repeated_s = 0.0
         self._axes = range(axes)
         self._period_s = period_s
-        self._estimators: list[Estimator] = [make_estimator(velocity, info.resolution_m) for _ in range(axes)]
+        self.estimators: list[Estimator] = [make_estimator(velocity, info.resolution_m) for _ in range(axes)]
         self.watches_speed = False
         # Less half a sample, so that no clock's rounding decides.
         self._frozen_s = max(FROZEN_S, FROZEN_SAMPLES / info.nominal_rate_hz) * (1.0 - 0.5 / FROZEN_SAMPLES)
-        self._filtered = not isinstance(self._estimators[0], Difference)
+        self._filtered = not isinstance(self.estimators[0], Difference)
         self._differences = [Difference() for _ in range(axes)]
         self._bounds_m = [
             (max(low - MARGIN * (high - low), -MOST_M), min(high + MARGIN * (high - low), MOST_M))
@@ -109,13 +111,13 @@ class Motion:
         ]
         self._has_clock = info.has_clock
         self._has_sequence = info.has_sequence
-        self._time_ns = -1
+        self.time_ns = -1
         self._sequence = -1
         self._waited_s = 0.0
 
     def start(self, sample: Sample) -> bool:
         """Begin at a sample, at rest; False when it makes no sense, and it is not known where the device is."""
-        self._time_ns = sample.time_ns
+        self.time_ns = sample.time_ns
         self._sequence = sample.sequence
         if not self._is_possible(sample):
             return False
@@ -134,9 +136,9 @@ class Motion:
             at_rest: forget what came before: the device stands where this sample says.
         """
         if self._has_clock:
-            dt_s = (sample.time_ns - self._time_ns) * 1e-9
+            dt_s = (sample.time_ns - self.time_ns) * 1e-9
             repeats = dt_s <= 0.0
-            self._time_ns = sample.time_ns
+            self.time_ns = sample.time_ns
         else:
             repeats = self._has_sequence and sample.sequence == self._sequence
             self._sequence = sample.sequence
@@ -169,7 +171,7 @@ class Motion:
             if not low_m <= position_m <= high_m:  # false for NaN as well
                 return False
             position_m -= origin_m[axis]
-            estimator = self._estimators[axis]
+            estimator = self.estimators[axis]
             if at_rest:
                 self._stand(axis, position_m)
             velocity_m_per_s = estimator.update(position_m, dt_s, sample.velocity_m_per_s[axis])
@@ -205,7 +207,7 @@ class Motion:
         self.origin_m = origin_m
 
     def _stand(self, axis: int, position_m: float) -> None:
-        self._estimators[axis].start(position_m)
+        self.estimators[axis].start(position_m)
         self._differences[axis].start(position_m)
 
     def _is_possible(self, sample: Sample) -> bool:

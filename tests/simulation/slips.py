@@ -69,7 +69,7 @@ APART = {
     "Contact.act": {"self.blending = False": "blends are at transitions, which the kernel has not"},
     "Contact.settle": {"if self.blending:": "the same"},
     "Guard.reduce": {
-        "if self._changing:": "limits that change and releases are transitions",
+        "if self.changing:": "limits that change and releases are transitions",
         "if self.mode is not _ARMED:": "the kernel is always armed",
         "self.latched = True": "no law's force comes through that is so large",
         "self.drop()": "the same",

@@ -33,7 +33,7 @@ def interpreted_because(tick: SpaceTick, device: SpatialDevice) -> str:
         return "a scene without objects"
     if any(each.solid.proxy.voxels for each in tick.solids):
         return 'shape = "mesh"'
-    if not all(isinstance(each, Difference) for each in motion._estimators):
+    if not all(isinstance(each, Difference) for each in motion.estimators):
         return "velocity: any but the difference of two samples"
     if motion.watches_speed:
         return "safety.max_speed_m_per_s"
@@ -41,7 +41,7 @@ def interpreted_because(tick: SpaceTick, device: SpatialDevice) -> str:
         return "a blend that is under way"
     if any(each.changing for each in device.axes):
         return "device.options.changes"
-    if guard.mode is not Mode.ARMED or guard._changing or tick.fallback or tick._fading or tick.sight.blind:
+    if guard.mode is not Mode.ARMED or guard.changing or tick.fallback or tick.fading or tick.sight.blind:
         return "a run that does not begin armed"
     return ""
 
@@ -128,7 +128,7 @@ class SpaceRun:
             np.array(matrices.table if matrices else (0.0,)),
             np.array(matrices.springs_n_per_m if matrices else (0.0,) * 3),
             np.array([contact in tick.awake for contact in solids]),
-            np.array([contact in tick._held for contact in solids]),
+            np.array([contact in tick.held for contact in solids]),
             *(np.array(values, float) for values in self._vectors()),
             self.trace,
         ]
@@ -163,10 +163,10 @@ class SpaceRun:
         device.ticks = self._loop.ticks
         for target, values in zip(self._vectors(), vectors, strict=True):
             target[:] = values.tolist()
-        tick.motion._time_ns = device.ticks * round(device.period_s * 1e9)
-        tick._at = (self._loop.at_x, self._loop.at_y, self._loop.at_z)
+        tick.motion.time_ns = device.ticks * round(device.period_s * 1e9)
+        tick.at_m = (self._loop.at_x, self._loop.at_y, self._loop.at_z)
         tick.awake = [contact for contact, near in zip(tick.solids, awake, strict=True) if near]
-        tick._held = [contact for contact, near in zip(tick.solids, held, strict=True) if near]
+        tick.held = [contact for contact, near in zip(tick.solids, held, strict=True) if near]
         tick.books.rest([contact for contact in tick.solids if contact not in tick.awake])
 
 
@@ -175,8 +175,8 @@ def _loop(tick: SpaceTick, device: SpatialDevice, ticks: int) -> SpaceLoop:
     matrices = device.masses
     loop.ticks, loop.stop = device.ticks, device.ticks + ticks - 1
     loop.dt_s = tick.motion.dt_s
-    loop.at_x, loop.at_y, loop.at_z = tick._at
-    loop.estimators, loop.nearby = tick.motion._estimators, tick._nearby
+    loop.at_x, loop.at_y, loop.at_z = tick.at_m
+    loop.estimators, loop.nearby = tick.motion.estimators, tick.nearby
     loop.coupled = matrices is not None
     loop.step_m = matrices.step_m if matrices else 1.0
     loop.places_x, loop.places_y, loop.places_z = matrices.places if matrices else (1, 1, 1)

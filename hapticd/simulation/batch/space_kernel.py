@@ -151,9 +151,6 @@ def run(
 
 def look_around(nearby: Any, contacts: Any, awake: Any, held: Any, x: float, y: float, z: float) -> None:
     """Find out which solids are in reach; one that comes into reach is begun with."""
-    nearby._x = x
-    nearby._y = y
-    nearby._z = z
     least_m = 1e3
     for at in range(len(contacts)):
         contact = contacts[at]
@@ -169,7 +166,7 @@ def look_around(nearby: Any, contacts: Any, awake: Any, held: Any, x: float, y: 
         else:
             awake[at] = False
             held[at] = False
-    nearby._free_m2 = least_m * least_m
+    nearby.stay(x, y, z, least_m)
 
 
 def record(plants: Any, contacts: Any, force_n: Any, requested_n: Any, trace: Any, row: int) -> None:

@@ -46,7 +46,11 @@ class SpaceTick(ControlTick):
         solids: one a solid, in scene order.
         objects: how many objects the scene has.
         listing: counted up whenever one of them comes, goes or changes places.
-        awake: those that the device may touch, and those that are gone and whose force still fades out.
+        awake: those that the device may touch, and those that fade out.
+        held: of those awake the ones whose force a tick without news holds.
+        fading: those that are gone and whose force still fades out.
+        at_m: where the last sample was that had news [m].
+        nearby: which solids are in reach.
         books: of all objects together.
 
     Raises:
@@ -76,9 +80,9 @@ class SpaceTick(ControlTick):
         self.listing = 0
         self.awake: list[SolidContact] = []
         self.books = SpaceBooks()
-        self._fading: list[SolidContact] = []
-        self._held: list[SolidContact] = []
-        self._at: Vector = (0.0, 0.0, 0.0)
+        self.fading: list[SolidContact] = []
+        self.held: list[SolidContact] = []
+        self.at_m: Vector = (0.0, 0.0, 0.0)
         self._take_solids()
         if info.start_m:
             x, y, z = info.start_m
@@ -139,7 +143,7 @@ class SpaceTick(ControlTick):
 
         def start() -> None:
             for contact in new:
-                contact.start(*self._at)
+                contact.start(*self.at_m)
             self._start_laws(laws)
 
         yield from self._switch(scene, safety, make_law, start)
@@ -150,14 +154,14 @@ class SpaceTick(ControlTick):
             contact.solid.index, contact.solid.members = solid.index, solid.members
         for contact, still in fading:
             contact.let_go(limit_n)
-            self._fading.append(contact)
+            self.fading.append(contact)
             for channel, law in still:
                 self._take_law(channel, law)
         blending: list[Channel] = []
         for contact, solid, channels in changed:
             if any(channel.applied_n != 0.0 for channel in contact.channels):
                 self._fade(contact)
-            contact.change(solid, channels, limit_n, self._at)
+            contact.change(solid, channels, limit_n, self.at_m)
             blending += contact.channels
         self.solids = there
         self.listing += _places(there) != before
@@ -172,7 +176,7 @@ class SpaceTick(ControlTick):
         for channel, law in laws:
             self._take_law(channel, law)
         if self.guard.limited:
-            blending = [channel for contact in (*self.solids, *self._fading) for channel in contact.channels]
+            blending = [channel for contact in (*self.solids, *self.fading) for channel in contact.channels]
         for one in blending:
             self._blend(one)
         self._take_solids()
@@ -236,14 +240,14 @@ class SpaceTick(ControlTick):
                     contacts.append(contact)
                 else:
                     contact.x_m = x_m
-            before_x, before_y, before_z = self._at
+            before_x, before_y, before_z = self.at_m
             x, y, z = position_m
-            self._at = at = (x, y, z)
+            self.at_m = at = (x, y, z)
             way = (x - before_x, y - before_y, z - before_z)
             vx, vy, vz = velocity_m_per_s
-            if self._nearby.moved_out(x, y, z):
+            if self.nearby.moved_out(x, y, z):
                 self._look_around()
-            self._held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
+            self.held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
             try:
                 for contact in contacts:
                     contact.act(periods)
@@ -257,7 +261,7 @@ class SpaceTick(ControlTick):
                     solid.act(periods)
         else:
             contacts = self._active
-            held = self._held
+            held = self.held
             for waiting in contacts:
                 waiting.hold(periods)
             for solid in held:
@@ -284,7 +288,7 @@ class SpaceTick(ControlTick):
             solid.settle(share, gain, limit_n, dt_s)
         if self.leaving:
             self._drop_gone()
-        if self._fading:
+        if self.fading:
             self._drop_faded()
         return force_n
 
@@ -292,12 +296,12 @@ class SpaceTick(ControlTick):
         return [*self.contacts, *(channel for contact in self.solids for channel in contact.channels)]
 
     def _fading_out(self) -> list[Contact]:
-        return [*self.leaving, *(channel for contact in self._fading for channel in contact.channels)]
+        return [*self.leaving, *(channel for contact in self.fading for channel in contact.channels)]
 
     def _stand(self) -> None:
         super()._stand()
         x, y, z = self.motion.position_m
-        self._at = (x, y, z)
+        self.at_m = (x, y, z)
         for contact in self.solids:
             contact.start(x, y, z)
         self._take_solids()
@@ -320,7 +324,7 @@ class SpaceTick(ControlTick):
 
     def _take_solids(self) -> None:
         """Run what the scene needs from now on."""
-        self._nearby = Nearby([contact.reach() for contact in self.solids])
+        self.nearby = Nearby([contact.reach() for contact in self.solids])
         self.ports = [*(contact.port for contact in self._moving()), *self.couplings]
         self.has_ports = self.has_ports or bool(self.ports)
         self.has_objects = self.has_objects or bool(self.solids)  # and their books once they are gone
@@ -329,15 +333,15 @@ class SpaceTick(ControlTick):
 
     def _look_around(self) -> None:
         """Find out which solids are in reach; one that comes into reach is begun with."""
-        near = set(self._nearby.look(*self._at))
+        near = set(self.nearby.look(*self.at_m))
         before = set(map(id, self.awake))
-        self.awake = list(self._fading)
-        self._held = [contact for contact in self._held if contact in self._fading or contact in self.solids]
+        self.awake = list(self.fading)
+        self.held = [contact for contact in self.held if contact in self.fading or contact in self.solids]
         resting = []
         for at, contact in enumerate(self.solids):
             if at in near or not contact.quiet:
                 if id(contact) not in before and contact.quiet:
-                    contact.start(*self._at)
+                    contact.start(*self.at_m)
                 self.awake.append(contact)
             else:
                 resting.append(contact)
@@ -346,20 +350,20 @@ class SpaceTick(ControlTick):
     def _fade(self, contact: SolidContact) -> None:
         """Have what a contact applies fade out beside it."""
         shade = contact.shade(no_law)
-        self._fading.append(shade)
-        self._held.append(shade)  # also at a tick without a new sample
+        self.fading.append(shade)
+        self.held.append(shade)  # also at a tick without a new sample
         for channel in shade.channels:
             self._blend(channel)
 
     def _drop_faded(self) -> None:
         """Close the books of what has faded out."""
-        gone = [contact for contact in self._fading if contact.faded]
+        gone = [contact for contact in self.fading if contact.faded]
         if gone:
             for contact in gone:
                 self.books.close(contact)
                 if contact.moves:  # its port knows it, and in the loop no collector looks for circles
                     del cast("RemoteContact", contact).port
-            self._fading = [contact for contact in self._fading if contact not in gone]
+            self.fading = [contact for contact in self.fading if contact not in gone]
             self._take_solids()
 
 
