@@ -315,7 +315,8 @@ class ControlTick:
         totals.ledger.absorb(self.past)
         for contact in (*self.contacts, *self.leaving):
             totals.ledger.absorb(contact.ledger)
-        self._own_ports.add_totals(totals)
+        if self.has_ports:
+            self._own_ports.add_totals(totals)
 
     def port_work_j(self) -> float:
         """What the clients of all couplings and forces there ever were have put in [J]."""
