@@ -334,10 +334,10 @@ class ControlTick:
                     self._changing = True
 
     def _check_speed(self) -> None:
-        limit = self.guard.max_speed_m_per_s
-        if self.motion.speed_squared > limit * limit and self.guard.mode is _ARMED:
-            speed = math.sqrt(self.motion.speed_squared)
-            self.fail(EventCode.OVER_SPEED, f"{speed:.3g} m/s is above the limit of {limit:g} m/s")
+        most_m_per_s = self.guard.max_speed_m_per_s
+        if self.motion.speed_squared > most_m_per_s * most_m_per_s and self.guard.mode is _ARMED:
+            speed_m_per_s = math.sqrt(self.motion.speed_squared)
+            self.fail(EventCode.OVER_SPEED, f"{speed_m_per_s:.3g} m/s is above the limit of {most_m_per_s:g} m/s")
 
     def _step_blind(self, calibrated: bool, passed_s: float) -> list[float]:
         """Let the last force out quickly, and be disarmed then."""
