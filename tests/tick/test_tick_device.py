@@ -262,6 +262,27 @@ def test_a_device_that_is_calibrated_and_still_makes_no_sense_is_a_fault(ticks: 
     assert rig.tick.guard.latched
 
 
+def test_one_that_forgot_where_it_is_while_disarmed_and_still_makes_no_sense_when_calibrated_is_a_fault() -> None:
+    rig = Rig(wall(2000.0), at_m=0.05, arm=False)
+    rig.sample.calibrated = False
+    assert rig.forces(5.0, 3) == [0.0] * 3
+    assert rig.tick.fault == 0
+    rig.sample.calibrated = True
+    assert rig.force(5.0) == 0.0
+    assert rig.tick.fault == EventCode.SAMPLE_IMPOSSIBLE
+    assert rig.tick.guard.latched
+
+
+def test_one_that_does_not_know_where_it_is_is_not_tared_before_its_first_tick_either() -> None:
+    rig = uncalibrated(at_m=0.02)
+    assert not rig.tick.tare()
+    rig.force(0.02)
+    assert not rig.tick.tare()
+    rig.sample.calibrated = True
+    rig.force(0.02)
+    assert rig.tick.tare()
+
+
 def test_an_armed_device_that_forgets_where_it_is_is_a_fault() -> None:
     rig = pressed()
     rig.sample.calibrated = False
