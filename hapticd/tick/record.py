@@ -319,7 +319,7 @@ class RecordLayout:
         law: int,
     ) -> None:
         """The same for a scene with couplings, forces or remote objects, and with what else it has."""
-        work_j = tick.port_work_j()
+        work_j = tick.own_ports.work_j()
         size = self.pack_space(area, at, tick, sample, seq, deadline_ns, late_us, busy_us, skipped, law, work_j, _PORTS)
         self._ports.pack(area, at + size, tick, work_j)
 

@@ -67,7 +67,8 @@ class ControlTick:
         advance: what a loop calls each tick: `step`, or what else a scene needs.
         has_objects: whether the scene has objects in space.
         ports: what clients drive, in scene order: objects, couplings, forces.
-        has_ports: whether there are such, or were.
+        own_ports: of these the ones that pull by themselves, couplings and forces, and their books.
+        has_ports: whether there are ports, or were.
 
     Raises:
         ConfigError: the scene or the way to find the velocity does not fit the device.
@@ -106,7 +107,7 @@ class ControlTick:
         self._last_fault = 0
         self._axes = range(axes)
         self._simulated = info.simulated
-        self._own_ports = TickPorts(scene, make_port, self.motion, info.resolution_m, ramp_s)
+        self.own_ports = TickPorts(scene, make_port, self.motion, info.resolution_m, ramp_s)
         self._gather()
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         self.motion.watch_speed(guard.max_speed_m_per_s < math.inf)
@@ -120,8 +121,8 @@ class ControlTick:
 
     @property
     def couplings(self) -> list[OnePort]:
-        """Of the ports the ones that pull by themselves, couplings and forces."""
-        return self._own_ports.couplings
+        """The couplings and forces of the scene, in its order."""
+        return self.own_ports.couplings
 
     @property
     def flags(self) -> int:
@@ -146,7 +147,7 @@ class ControlTick:
         if self.sight.blind and sample.calibrated:
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE)
         self._stand()
-        self._start_laws([(contact, contact.law) for contact in (*self._under_law(), *self._own_ports.axes)])
+        self._start_laws([(contact, contact.law) for contact in (*self._under_law(), *self.own_ports.axes)])
 
     def step(self, sample: Sample, clock_dt_s: float) -> list[float]:
         """One tick.
@@ -242,7 +243,7 @@ class ControlTick:
         if self.guard.latched:
             return False
         fresh = [(contact, self.make_law()) for contact in self._under_law()]
-        fresh += [(axis, axis.make_law()) for axis in self._own_ports.axes]
+        fresh += [(axis, axis.make_law()) for axis in self.own_ports.axes]
         laws = self._start_laws(fresh)
         self.guard.arm()
         self.fallback = False
@@ -299,7 +300,7 @@ class ControlTick:
         """Put the damping fallback in the place of every law, and stop."""
         if not self.fallback:
             self.fallback = True
-            failing = (*self._under_law(), *self._own_ports.axes)
+            failing = (*self._under_law(), *self.own_ports.axes)
             for contact, law in self._start_laws([(contact, self._fallback_law()) for contact in failing]):
                 self._take_law(contact, law)
         self.fail(code, text)
@@ -316,11 +317,7 @@ class ControlTick:
         for contact in (*self.contacts, *self.leaving):
             totals.ledger.absorb(contact.ledger)
         if self.has_ports:
-            self._own_ports.add_totals(totals)
-
-    def port_work_j(self) -> float:
-        """What the clients of all couplings and forces there ever were have put in [J]."""
-        return self._own_ports.work_j()
+            self.own_ports.add_totals(totals)
 
     def _change_walls(self, periods: float) -> None:
         """Bring changes of walls into force whose time has come: on a real device by a ramp."""
@@ -385,7 +382,7 @@ class ControlTick:
         if safety is not None:
             limits(safety, self.info)
         make = self.make_law if make_law is None else make_law
-        switch = Switch(self.contacts, self._own_ports)
+        switch = Switch(self.contacts, self.own_ports)
         if scene is not None:
             yield from switch.to_scene(scene, self.info, self.period_s, self.ramp_s, make)
         if make_law is not None:
@@ -411,7 +408,7 @@ class ControlTick:
             contact.wall = wall
             self._blend(contact)
         self.contacts = switch.walls.contacts
-        self._own_ports.take(switch.ports, self.ramp_s)
+        self.own_ports.take(switch.ports, self.ramp_s)
         self._gather()
         self._changing = any(contact.wall.changes_left for contact in self.contacts)
         laws = switch.laws
@@ -425,7 +422,7 @@ class ControlTick:
 
     def _gather(self) -> None:
         """Make the lists that the ticks go through."""
-        self._active = [*self.contacts, *self.leaving, *self._own_ports.axes]
+        self._active = [*self.contacts, *self.leaving, *self.own_ports.axes]
         self.ports = list(self.couplings)
         self.has_ports = self.has_ports or bool(self.ports)  # and their books once they are gone
 

@@ -90,7 +90,7 @@ class PortLayout:
             work_j: what the clients of all couplings and forces have put in [J].
         """
         ports = tick.ports
-        objects = len(ports) - len(tick.couplings)
+        objects = len(ports) - len(tick.own_ports.couplings)
         shown = list(enumerate(ports))
         if len(shown) > MOST_PORTS:
             shown = sorted(shown, key=_rank)[:MOST_PORTS]
