@@ -11,6 +11,7 @@ from hapticd.device import DeviceInfo, Diagnosis, FoundDevice, Metric, Sample
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DeviceProtocolError, DeviceTimeoutError
 from hapticd.trace import DriverTrace
+from hapticd_drivers.claims import Claims
 from hapticd_drivers.haply import messages
 from hapticd_drivers.haply.courier import Courier
 from hapticd_drivers.haply.traced_courier import TracedCourier
@@ -69,6 +70,7 @@ class Inverse3(Driver[Inverse3Options]):
         super().__init__(options, period_s)
         self.trace = DriverTrace(options.trace)
         self._courier: Courier | None = None
+        self._claims = Claims()
         self._device = ""
         self._sample = Sample(len(messages.AXES))
         self._state_wait_s = PATIENCE * period_s
@@ -135,6 +137,7 @@ class Inverse3(Driver[Inverse3Options]):
                 "it up, or say which one"
             )
         self._device = wanted[0]
+        self._claims.take("inverse3", f"{self._device} at {options.url}")
         self._silent = 0
         self._seen = courier.exchanges
         self._sample.sequence = 0
@@ -185,6 +188,7 @@ class Inverse3(Driver[Inverse3Options]):
         courier, self._courier = self._courier, None
         if courier is not None:
             courier.end()
+        self._claims.release()
 
     def _let_go(self) -> None:
         """A force of 0, and a state after it."""

@@ -11,6 +11,7 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import ConfigError, DeviceProtocolError, DeviceTimeoutError, DriverError, DriverStateError
 from hapticd.trace import DriverTrace
+from hapticd_drivers.claims import Claims
 from hapticd_drivers.motors.crew import Crew
 from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.motors.link import BusLink, TracedLink
@@ -51,6 +52,7 @@ class MotorDriver(Driver[MotorOptionsT]):
     def __init__(self, options: MotorOptionsT, period_s: float) -> None:
         super().__init__(options, period_s)
         self._crew: Crew | None = None
+        self._claims = Claims()
         self.trace = DriverTrace(options.trace)
         self._drums = [Drum(axis) for axis in options.axes]
         self._sample = Sample(len(self._drums))
@@ -96,6 +98,8 @@ class MotorDriver(Driver[MotorOptionsT]):
         if self.options.trace:
             link = TracedLink(link, self.trace)
         self._crew = crew = self._gather(link)
+        for axis in self.options.axes:  # before the greeting, which has a motor let go
+            self._claims.take(self.NAME, f"motor {axis.id} on {link.where}")
         crew.greet()
         crew.note()
         for drum, motor in zip(self._drums, crew.motors, strict=True):
@@ -197,6 +201,7 @@ class MotorDriver(Driver[MotorOptionsT]):
         crew, self._crew = self._crew, None
         if crew is not None:
             crew.link.close()
+        self._claims.release()
 
     def _accept(self) -> None:
         """Fill the sample in."""

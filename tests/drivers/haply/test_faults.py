@@ -13,7 +13,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticd.errors import DeviceDisconnectedError, DeviceNotFoundError, DeviceTimeoutError, DriverError
+from hapticd.errors import (
+    DeviceBusyError,
+    DeviceDisconnectedError,
+    DeviceNotFoundError,
+    DeviceTimeoutError,
+    DriverError,
+)
 from hapticd_drivers.haply import driver as haply_driver
 from hapticd_drivers.haply import messages
 from hapticd_drivers.haply.driver import BAD, Inverse3, Inverse3Options
@@ -110,6 +116,18 @@ def test_disable_and_close_leave_a_force_of_zero(service: FakeService) -> None:
     driver.write([0.0, 0.0, PUSH_N])
     driver.close()
     assert service.cursor.force_n == [0.0, 0.0, 0.0]
+
+
+def test_a_second_program_is_refused_the_same_device_until_the_first_has_closed_it(service: FakeService) -> None:
+    """The service lets any number of clients in, and a second one's zero force would take the first one's away."""
+    first = pressing(service)
+    second = Inverse3(Inverse3Options(url=service.url), 0.001)
+    with pytest.raises(DeviceBusyError, match="another program of hapticd has 049D"):
+        second.open()
+    assert service.cursor.force_n == [0.0, 0.0, PUSH_N]
+    first.close()
+    second.open()
+    second.close()
 
 
 def test_one_message_a_force_and_one_state_a_message(service: FakeService) -> None:

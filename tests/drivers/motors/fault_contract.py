@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import pytest
 
 from hapticd.driver import DriverState
-from hapticd.errors import DeviceFaultError, DriverError
+from hapticd.errors import DeviceBusyError, DeviceFaultError, DriverError
 from hapticd_drivers.motors.driver import MotorDriver
 from hapticd_drivers.motors.metrics import DAMAGED, UNKNOWN
 from tests.drivers.motors.bench import PATIENCE_S
@@ -155,6 +155,15 @@ class MotorFaultContract:
         bench.first.pass_time(0.01)
         assert bench.first.torque_n_m == 0.0
         driver.close()
+
+    def test_a_second_program_is_refused_and_the_first_pushes_on(self, bench: MotorLab) -> None:
+        """A CAN interface lets any number of programs in, and the greeting of a second has the motors let go."""
+        first = pressing(bench)
+        second = bench.driver()
+        with pytest.raises(DeviceBusyError, match="end it first"):
+            second.open()
+        bench.bench.settle(first)
+        assert bench.first.torque_n_m == pytest.approx(PUSH_N * RADIUS_M)
 
     def test_a_controller_that_let_go_follows_again_only_when_it_is_enabled(self, bench: MotorLab) -> None:
         driver = pressing(bench)
