@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from hapticd.cli.group import Overview
+from hapticd.cli.local_time import moment
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, Trace, plot
 from hapticd.errors import HapticdError
 from hapticd.faults.export import write_csv
@@ -158,7 +158,7 @@ def _find(name: str | None, instance: str, directory: Path | None) -> Path:
 def _lines(record: FaultRecord, summary: FaultSummary) -> list[str]:
     header = record.header
     event = header["event"]
-    when = time.strftime("%Y-%m-%d %H:%M:%S %z", time.localtime(event["timestamp"]))
+    when = moment(event["timestamp"])
     gone = f"gone after {summary.ramp_ticks} ticks" if summary.ramp_ticks is not None else "not gone in this record"
     if not summary.after_s:
         gone = "no ticks after the fault"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import typer
 
 from hapticd.cli.completion import instances
+from hapticd.cli.local_time import moment
 from hapticd.client.commands import command
 from hapticd.errors import InstanceError
 from hapticd.paths import living_instances
@@ -68,10 +68,10 @@ def _lines(one: Mapping[str, Any]) -> list[str]:
         f"{100.0 * one['late_share']:.2g} % late",
     )
     device = status.device + (", simulated" if status.simulated else "")
-    since = f", since {_shown(status.started_timestamp)}" if status.started_timestamp else ""
+    since = f", since {moment(status.started_timestamp)}" if status.started_timestamp else ""
     lines = [f"{one['name']}: {', '.join(parts)}", f"  {device}{since}"]
     if status.fault_code:
-        lines.append(f"  fault {status.fault_code} at {_shown(status.fault_timestamp)}: {status.fault_text}")
+        lines.append(f"  fault {status.fault_code} at {moment(status.fault_timestamp)}: {status.fault_text}")
     if status.latched:
         lines.append("  no force until `hapticd clear`, then `hapticd arm`")
     lines.extend(_driven(status))
@@ -85,7 +85,3 @@ def _driven(status: Status) -> Iterator[str]:
     for name, kind, owner, messages, refused in zip(status.remote_name, *counted, strict=True):
         whose = f"driven by {owner}" if owner else "no client"
         yield f"  {kind} {name}: {whose}, {messages} messages, {refused} refused"
-
-
-def _shown(timestamp: float) -> str:
-    return time.strftime("%Y-%m-%d %H:%M:%S %z", time.localtime(timestamp))

@@ -275,6 +275,8 @@ def test_without_a_terminal_it_prints_a_line_a_second(feed: Feed) -> None:
     assert "\x1b" not in lines[0]
     assert "armed     energy-cycle  999.8 Hz  late 7  skipped 3  z " in lines[0]
     assert lines[0].count(" mm ") == 1
+    for line in lines:
+        assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d [+-]\d{4}  |waiting", line), line
 
 
 def test_without_a_terminal_it_says_that_it_waits(feed: Feed) -> None:

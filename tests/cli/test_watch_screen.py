@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import time
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
@@ -104,6 +106,29 @@ def test_one_line_names_each_axis() -> None:
     known.take([Status(axes=("x", "y"), law="none"), Position(0.0, 1, (1e-3, -2e-3), (), (1.0, 0.0), ())], 0.0)
     assert "disarmed  none" in one_line(known)
     assert "x +1.000 mm +1.00 N  y -2.000 mm +0.00 N" in one_line(known)
+
+
+@pytest.fixture
+def nepal(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A user whose clock is five hours and three quarters ahead of UTC."""
+    with monkeypatch.context() as patched:
+        patched.setenv("TZ", "NPT-5:45")
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.usefixtures("nepal")
+def test_times_say_how_far_they_are_from_utc_as_those_of_the_status_do() -> None:
+    """Seconds after the epoch, which a status and a fault record show as the same."""
+    known = ScreenState()
+    known.take([Status(axes=("x",)), Event(62.0, 1, 101, "armed")], 0.0)
+    known.take([Position(61.0, 1, (0.0,), (0.0,), (0.0,), (0.0,))], 0.0)
+    assert one_line(known).startswith("1970-01-01 05:46:01 +0545  disarmed")
+    for width in (60, 120):
+        text = "\n".join(line.plain for line in frame(known, "ipc:///x", width, 40, 0.0))
+        assert "05:46:02 · armed" in text
+        assert "times +0545" in text
 
 
 @pytest.mark.parametrize(

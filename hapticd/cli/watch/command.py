@@ -24,6 +24,7 @@ import typer
 from rich.console import Console, Group
 from rich.live import Live
 
+from hapticd.cli.local_time import moment
 from hapticd.cli.remote import Instance, Keys
 from hapticd.cli.watch.screen import SILENT_S, frame, one_line
 from hapticd.cli.watch.state import ScreenState
@@ -265,7 +266,7 @@ def _print_lines(feed: _Feed, stop: Callable[[], bool]) -> None:
     while not stop():
         events = [record for record in feed.drain(0.1) if isinstance(record, Event)]
         for event in events:
-            _say(f"{time.strftime('%H:%M:%S', time.localtime(event.timestamp))}  event {event.code}  {event.text}")
+            _say(f"{moment(event.timestamp)}  event {event.code}  {event.text}")
         if time.monotonic() < due_s:
             continue
         due_s += 1.0

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
+from hapticd.cli.local_time import moment, zone
 from hapticd.cli.watch.contacts import count_walls, of_objects
 from hapticd.cli.watch.health import health_lines
 from hapticd.cli.watch.line import si
@@ -70,7 +71,7 @@ def one_line(known: ScreenState) -> str:
     assert status is not None
     stamp = known.position.timestamp if known.position else status.timestamp
     parts = [
-        time.strftime("%H:%M:%S", time.localtime(stamp)),
+        moment(stamp),
         f"{_state(status)[0].lower():8}",
         status.law,
         f"{status.measured_rate_hz:.1f} Hz",
@@ -254,11 +255,12 @@ def _energy(known: ScreenState, width: int) -> Text:
 
 
 def _logs(known: ScreenState, width: int, rows: int) -> list[Text]:
+    times = _quiet(f"times {zone(known.events[0].timestamp)}" if known.events else "")
     if width < _NARROW:
-        return _box("events", Text(""), _event_rows(known, rows, width - 4), width)
+        return _box("events", times, _event_rows(known, rows, width - 4), width)
     left = _CYCLES_WIDTH
     cycles = _box("cycles", Text(""), _cycle_rows(known, rows), left)
-    return _side_by_side(cycles, _box("events", Text(""), _event_rows(known, rows, width - left - 4), width - left))
+    return _side_by_side(cycles, _box("events", times, _event_rows(known, rows, width - left - 4), width - left))
 
 
 def _cycle_rows(known: ScreenState, rows: int) -> list[Text]:
