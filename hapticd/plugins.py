@@ -68,6 +68,27 @@ def law(name: str) -> ModuleType:
     return loaded
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, and not what a plug-in raises by itself."""
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Have Ctrl-C told apart, where it would be a KeyboardInterrupt: in the main thread, with no handler of another."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield
+        return
+    signal.signal(signal.SIGINT, _interrupt)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGINT) is _interrupt:  # the plug-in may have set one of its own
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def _driver_of_module(name: str) -> type[Driver[Any]]:
     """The driver of `package.module` or `package.module.Class`."""
     try:
@@ -128,9 +149,9 @@ def _imported(kind: str, name: str, module: str) -> ModuleType:
         PluginError: it cannot be imported; caused by what went wrong.
     """
     try:
-        with _interruptible():
+        with interruptible():
             return importlib.import_module(module)
-    except _Interrupted:
+    except Interrupted:
         raise
     except BaseException as error:
         raise PluginError(f"{kind} module {name!r} cannot be imported: {in_words(error, module)}") from error
@@ -142,35 +163,14 @@ def _find(group: str, name: str) -> EntryPoint | None:
 
 def _load(point: EntryPoint) -> Any:
     try:
-        with _interruptible():
+        with interruptible():
             return point.load()
-    except _Interrupted:
+    except Interrupted:
         raise
     except BaseException as error:
         said = in_words(error, point.module)
         raise PluginError(f"{point.name} ({point.value}) cannot be imported: {said}") from error
 
 
-class _Interrupted(KeyboardInterrupt):
-    """Ctrl-C, and not what a plug-in raises by itself."""
-
-
 def _interrupt(_number: int, _frame: FrameType | None) -> NoReturn:
-    raise _Interrupted
-
-
-@contextlib.contextmanager
-def _interruptible() -> Iterator[None]:
-    """Have Ctrl-C told apart, where it would be a KeyboardInterrupt: in the main thread, with no handler of another."""
-    if (
-        threading.current_thread() is not threading.main_thread()
-        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    ):
-        yield
-        return
-    signal.signal(signal.SIGINT, _interrupt)
-    try:
-        yield
-    finally:
-        if signal.getsignal(signal.SIGINT) is _interrupt:  # the plug-in may have set one of its own
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+    raise Interrupted

@@ -142,7 +142,10 @@ def parse(text: str, name: str, folder: Path | None = None) -> LoadedConfig:
         _check_together(problems, config)
         if driver is not None and options is not None:
             try:
-                driver.check(options, config.loop.period_s)
+                with plugins.interruptible():
+                    driver.check(options, config.loop.period_s)
+            except plugins.Interrupted:
+                raise
             except ValueError as error:
                 problems.add(("device", "options"), str(error))
             except BaseException as error:  # noqa: BLE001 - a plug-in is anybody's code
@@ -223,7 +226,10 @@ def _law(
 
 def _checked(problems: Problems, model: type[TableT], data: object, at: tuple[str, str]) -> TableT | None:
     try:
-        return problems.validated(model, data, at)
+        with plugins.interruptible():
+            return problems.validated(model, data, at)
+    except plugins.Interrupted:
+        raise
     except BaseException as error:  # noqa: BLE001 - a plug-in's own validators may raise anything
         problems.add(at, f"cannot be checked: {in_words(error, model.__module__)}")
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from pydantic import field_validator
 from hapticd.config.loading import load, parse
 from hapticd.errors import ConfigError
 from hapticd.law import LawParams
+from hapticd_drivers.loopback import Loopback
 
 
 def problems(text: str) -> tuple[str, ...]:
@@ -161,6 +163,30 @@ def test_a_plugin_whose_own_check_crashes_is_a_problem_of_that_table(monkeypatch
     said, _, line = problem.rpartition(":")
     assert said == "lab.toml: controller.params: cannot be checked: KeyError: 'gain\\n2.0' (test_problems.py"
     assert line.removesuffix(")").isdigit()
+
+
+def test_ctrl_c_while_a_plugin_checks_ends_the_check_and_what_it_raises_itself_is_a_problem(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Params(LawParams):
+        gain: float = 1.0
+
+        @field_validator("gain")
+        @classmethod
+        def _slow(cls, gain: float) -> float:
+            if gain == 2.0:
+                raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
+            return gain
+
+    monkeypatch.setattr(parse("[controller]\nlaw = 'none'", "x").law, "Params", Params)
+    (problem,) = problems("[controller]\nlaw = 'none'\nparams = { gain = 2.0 }")
+    assert "cannot be checked: KeyboardInterrupt" in problem
+    with pytest.raises(KeyboardInterrupt):
+        problems("[controller]\nlaw = 'none'\nparams = { gain = 3.0 }")
+    monkeypatch.setattr(Loopback, "check", lambda *_: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        problems("[loop]")
 
 
 def test_a_parameter_that_no_law_can_be_given_is_a_problem_of_that_table(monkeypatch: pytest.MonkeyPatch) -> None:
