@@ -279,6 +279,16 @@ def test_on_a_tablet_held_upright_disarm_stays_in_sight(page: Page, daemon: Daem
     state(page, "Armed")
 
 
+def test_on_a_phone_no_figure_and_no_word_of_the_device_is_cut(page: Page) -> None:
+    """Which law, how much energy, and whether the device is a simulated one."""
+    page.resize(390, 844)
+    page.wait_for("document.documentElement.scrollWidth <= innerWidth")
+    cut = "[...document.querySelectorAll('.state span, .figures dd, .panel > header, .panel header output')]"
+    page.wait_for(f"{cut}.every((part) => part.scrollWidth <= part.clientWidth)")
+    assert page.evaluate(f"{cut}.length") > 10
+    assert page.evaluate("Math.min(...[...document.querySelectorAll('.plot')].map((plot) => plot.clientHeight))") > 50
+
+
 def test_it_is_dark_where_the_system_is_and_where_it_is_told_to_be(browser: Browser, served: Served) -> None:
     for dark in (False, True):
         with browser.page(served.watch, dark=dark) as page:
@@ -318,6 +328,7 @@ def test_a_daemon_that_has_gone_is_said(browser: Browser, served: Served, daemon
         daemon.process.terminate()
         state(page, "No daemon")
         assert page.evaluate("document.getElementById('trouble').hidden") is False
+        assert page.evaluate("document.getElementById('rate').textContent") == "–"
         page.click("#disarm")
         page.wait_for("document.getElementById('answer').innerText.includes('no daemon answers')")
         served.process.terminate()

@@ -20,7 +20,8 @@ export class Strip {
       const notes = [status.device || status.driver, status.simulated ? "simulated" : "", status.calibrated ? "" : "not calibrated"];
       this.get("device").textContent = notes.filter(Boolean).join(" · ");
       this.get("law").textContent = status.fallback ? `${status.law} (fallback)` : status.law;
-      this.get("rate").textContent = status.measured_rate_hz ? status.measured_rate_hz.toFixed(1) : "–";
+      const runs = link && !trouble && status.measured_rate_hz; // what was measured before is no rate now
+      this.get("rate").textContent = runs ? status.measured_rate_hz.toFixed(1) : "–";
     }
     const away = link ? trouble : "No connection to the dashboard's server: what is shown is old. Disarm at the device, or run: hapticd disarm";
     banner(this.get("trouble"), away);
