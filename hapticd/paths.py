@@ -102,6 +102,23 @@ def runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
     return _user_runtime(instance)
 
 
+def make_directory(directory: Path, mode: int) -> None:
+    """Make a directory, when it is not there, and those above it that are missing: whatever the umask, none for all.
+
+    Who may write to one above may put another in the place of this one.
+
+    Args:
+        directory: its path.
+        mode: its rights, before the umask; those above it get 0o755.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    if not directory.parent.exists():
+        make_directory(directory.parent, 0o755)
+    directory.mkdir(mode=mode, exist_ok=True)
+
+
 def make_runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
     """The same, made when it is not there; below /tmp it is closed to other users.
 
@@ -113,7 +130,7 @@ def make_runtime_directory(instance: str = DEFAULT_INSTANCE) -> Path:
     shared = directory.is_relative_to(_temporary())
     mode = 0o700 if shared else 0o755
     try:
-        directory.parent.mkdir(mode=mode, parents=True, exist_ok=True)
+        make_directory(directory.parent, mode)
         if shared and not _ours(directory.parent):
             raise _foreign(directory.parent)
         directory.mkdir(mode=mode, exist_ok=True)

@@ -17,7 +17,8 @@ import pytest
 
 from hapticd import paths
 from hapticd.errors import ConfigError, InstanceError
-from hapticd.keys.store import key_directory
+from hapticd.faults.store import FaultStore
+from hapticd.keys.store import KeyDirectory, key_directory
 from hapticd.paths import (
     fault_directory,
     living_instances,
@@ -298,3 +299,21 @@ def test_a_directory_that_the_environment_names_and_that_is_closed_is_named(
     finally:
         os.seteuid(before)
         (tmp_path / "lab").chmod(0o700)
+
+
+def test_under_any_umask_no_directory_is_made_that_every_user_may_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One above keys that is open to all would let anyone put other keys in their place."""
+    for name in ("HAPTICD_RUNTIME_DIR", "HAPTICD_STATE_DIR", "HAPTICD_KEYS_DIR"):
+        monkeypatch.setenv(name, str(tmp_path / name / "lab"))
+    before = os.umask(0)
+    try:
+        make_runtime_directory()
+        FaultStore(fault_directory("default")).write(1e9, 202, b"a record", keep=5)
+        KeyDirectory(key_directory()).make()
+    finally:
+        os.umask(before)
+    made = [path for path in tmp_path.rglob("*") if path.is_dir()]
+    assert len(made) >= 8
+    assert [path for path in made if path.stat().st_mode & 0o022] == []

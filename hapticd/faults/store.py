@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hapticd.errors import HapticdError
 from hapticd.faults.record import SUFFIX
+from hapticd.paths import make_directory
 from hapticd.replacing import put
 
 _UNFINISHED = ".part"
@@ -50,7 +51,7 @@ class FaultStore:
         Raises:
             OSError: it could not be written; the directory is as it was.
         """
-        self.directory.mkdir(parents=True, exist_ok=True, mode=0o750)
+        make_directory(self.directory, 0o750)
         milliseconds = int(epoch_s * 1e3)
         stamp = time.strftime("%Y%m%dT%H%M%S", time.gmtime(milliseconds // 1000))
         path = self.directory / f"{stamp}.{milliseconds % 1000:03d}Z-{code}{SUFFIX}"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from hapticd.errors import ConfigError
 from hapticd.keys.file import Key, KeyWriteError, new_pair, read, write
-from hapticd.paths import home_directory
+from hapticd.paths import home_directory, make_directory
 
 SYSTEM_KEYS = Path("/etc/hapticd/keys")
 """The system service's own."""
@@ -198,7 +198,7 @@ class KeyDirectory:
         try:
             for directory in (self.path, self.path / CLIENTS):
                 if not directory.is_dir():
-                    directory.mkdir(mode=0o700, parents=True)
+                    make_directory(directory, 0o700)
                     os.chown(directory, -1, group)
                     directory.chmod(0o700 if group < 0 else 0o750)
         except OSError as error:
