@@ -143,7 +143,8 @@ def rivals() -> set[str]:
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # it has just ended
             parents[int(process.name)] = int((process / "stat").read_text().rpartition(")")[2].split()[1])
-            command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+            command = (process / "cmdline").read_bytes().decode(errors="replace")
+            command = "".join(each if each.isprintable() else " " for each in command).strip()
             if command and any(_is_realtime(int(thread.name)) for thread in (process / "task").iterdir()):
                 commands[int(process.name)] = command[:60]
     return {f"{process} {command}" for process, command in commands.items() if not _is_ours(process, parents)}

@@ -144,12 +144,15 @@ def streams(root: Path = ROOT) -> Finding:
 
 
 def state(directory: Path) -> Finding:
-    """Whether the disk of the state directory has room for fault records.
+    """Whether fault records can be written to the state directory, and its disk has room for them.
 
     Args:
         directory: where the instance keeps them.
     """
     place = _nearest(directory)
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        why = "this user may not write there" if place.is_dir() else f"{place} is no directory"
+        return problem(f"{directory}: {why}, no fault could be recorded", "export HAPTICD_STATE_DIR=~/hapticd")
     free = shutil.disk_usage(place).free
     shown = f"{directory}: {free / 2**30:.3g} GiB free"
     largest = f"sudo du -xh -d 3 {_mount_of(place)} | sort -h | tail  # the largest directories: make room"

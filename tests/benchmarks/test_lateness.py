@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from hapticd import measure
 from hapticd.cli import main
 from hapticd.errors import HapticdError, RealtimeError
 from hapticd.measure import MachineWatch, Quantiles, Verdict, doubtful
@@ -250,3 +251,14 @@ def test_both_layouts_run_the_same_loop_on_the_common_grid(serve: Callable[..., 
     assert len(ticks.seq) > 0
     assert all(deadline % MS == 0 for deadline in ticks.deadline_ns)
     assert list(ticks.seq) == list(range(ticks.seq[0], ticks.seq[0] + len(ticks.seq)))
+
+
+def test_of_another_program_only_what_can_be_printed_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its command line is its own to choose, and may hold what a terminal obeys."""
+    monkeypatch.setattr(measure, "_is_realtime", lambda _: True)
+    monkeypatch.setattr(measure, "_is_ours", lambda *_: False)
+    with subprocess.Popen(["late\n\x1b[2Jr", "60"], executable="/bin/sleep") as rival:
+        try:
+            assert f"{rival.pid} late  [2Jr 60" in measure.rivals()
+        finally:
+            rival.kill()

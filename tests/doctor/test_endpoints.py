@@ -197,6 +197,17 @@ def test_fault_records_need_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     says(endpoints.state(tmp_path / "not/yet/there"), mark, "free")
 
 
+def test_fault_records_need_a_directory_that_this_user_may_write_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With room on the disk or without: there the daemon could write none."""
+    (tmp_path / "file").touch()
+    says(endpoints.state(tmp_path / "file" / "faults"), "problem", "file is no directory, no fault could be recorded")
+    monkeypatch.setattr("os.access", lambda *_: False)
+    found = says(endpoints.state(tmp_path), "problem", "this user may not write there, no fault could be recorded")
+    assert "HAPTICD_STATE_DIR=" in found.mend[0]
+
+
 # -- the configuration
 
 
