@@ -153,6 +153,8 @@ class RecordingFile:
                     continue
             else:
                 os.ftruncate(self._fd, min(self._ends, default=0))
+            if not self._ends:
+                self.path.unlink()  # an empty one, in the way of the next try
         except OSError:
             pass  # the disk is gone, and with it what could be said in it
         finally:
