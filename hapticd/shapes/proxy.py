@@ -11,16 +11,18 @@ runs interpreted in the loop and compiled in studies.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
-from hapticd.shapes.surface import SURFACE_M, ahead, buried, distance, land, trace
+from hapticd.shapes.surface import SURFACE_M, ahead, buried, distance, land, passed, trace
 
 _LEAST_M2 = 1e-16
 _SLIDES = 10
 _LEAST_SHARE = 0.01
 _CREASE = 0.02
 _ONE_FACE = 0.98
+_GONE = 0.5
+_THIN_M2 = 4e-8  # what stands on a face and is thinner than 0.2 mm may be passed
 _LANDINGS = 3
 _WAY_OUT = 100
 _CONE = 1.02
@@ -60,19 +62,30 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             break
         d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
         wall = False
-        if (
-            proxy.end_part > proxy.first_part
-            and -SURFACE_M <= d <= SURFACE_M
-            and buried(proxy, others, voxels, x, y, z, mx, my, mz)
-        ):  # between two shapes that are flush: what stands there is another face
-            wall = True
-            d, mx, my, mz = ahead(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, nx, ny, nz)
-            x = proxy.gx - d * mx
-            y = proxy.gy - d * my
-            z = proxy.gz - d * mz
-            if d < 0.0:
-                break
-            d = 1.0
+        if proxy.end_part > proxy.first_part:
+            vx = x - proxy.gx
+            vy = y - proxy.gy
+            vz = z - proxy.gz
+            if -SURFACE_M <= d <= SURFACE_M and buried(proxy, others, voxels, x, y, z, mx, my, mz):
+                wall = True  # between two shapes that are flush: what stands there is another face
+                e, ox, oy, oz = ahead(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, nx, ny, nz, inf)
+            elif vx * vx + vy * vy + vz * vz > _THIN_M2 and vx * tx + vy * ty + vz * tz > _GONE * (
+                tx * tx + ty * ty + tz * tz
+            ):
+                e, ox, oy, oz = passed(
+                    proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, nx, ny, nz, tx, ty, tz, vx, vy, vz
+                )
+                wall = e >= -SURFACE_M
+            if wall:
+                if e < -SURFACE_M:
+                    break
+                mx = ox
+                my = oy
+                mz = oz
+                x = proxy.gx - e * mx
+                y = proxy.gy - e * my
+                z = proxy.gz - e * mz
+                d = 1.0
         vx = px - x
         vy = py - y
         vz = pz - z

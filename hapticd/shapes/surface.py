@@ -14,6 +14,7 @@ _STEPS = 48
 _BEYOND_M = 4.0 * SURFACE_M
 _AGAINST = -0.9
 _FACE = 0.98
+_BEHIND = 0.04
 _LANDINGS = 4
 
 
@@ -79,9 +80,9 @@ def buried(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, n
 
 
 def ahead(
-    proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, nx: float, ny: float, nz: float
+    proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, nx: float, ny: float, nz: float, reach: float
 ) -> tuple[float, float, float, float]:
-    """Of all shapes of a union, distance and normal of the nearest that stands up from a face.
+    """Of the shapes of a union, distance and normal of the nearest that stands up from a face.
 
     Args:
         proxy: the proxy.
@@ -93,18 +94,26 @@ def ahead(
         nx: the face's normal, with ny and nz.
         ny: see nx.
         nz: see nx.
+        reach: what is further away does not count [m].
 
     Returns:
-        A negative distance where there is none.
+        Less than `-SURFACE_M` where there is none.
     """
     x += _BEYOND_M * nx
     y += _BEYOND_M * ny
     z += _BEYOND_M * nz
     d, mx, my, mz = shape_distance(proxy, voxels, x, y, z)
-    if d < 0.0 or nx * mx + ny * my + nz * mz > _FACE:
+    if d < -SURFACE_M or nx * mx + ny * my + nz * mz > _FACE:
         d = -1.0
     for at in range(proxy.first_part, proxy.end_part):
         part = others[at]
+        if part.bound_m >= 0.0:
+            bx = x - part.bound_x
+            by = y - part.bound_y
+            bz = z - part.bound_z
+            far = reach + part.bound_m
+            if bx * bx + by * by + bz * bz > far * far:
+                continue
         bx = x - part.px
         by = y - part.py
         bz = z - part.pz
@@ -112,7 +121,7 @@ def ahead(
         qy = part.xy * bx + part.yy * by + part.zy * bz
         qz = part.xz * bx + part.yz * by + part.zz * bz
         e, qx, qy, qz = shape_distance(part, voxels, qx, qy, qz)
-        if e >= 0.0 and (d < 0.0 or e < d):
+        if e >= -SURFACE_M and (d < -SURFACE_M or e < d):
             bx = part.xx * qx + part.xy * qy + part.xz * qz
             by = part.yx * qx + part.yy * qy + part.yz * qz
             bz = part.zx * qx + part.zy * qy + part.zz * qz
@@ -122,6 +131,71 @@ def ahead(
                 my = by
                 mz = bz
     return d, mx, my, mz
+
+
+def passed(
+    proxy: Any,
+    others: Any,
+    voxels: Any,
+    gx: float,
+    gy: float,
+    gz: float,
+    nx: float,
+    ny: float,
+    nz: float,
+    tx: float,
+    ty: float,
+    tz: float,
+    x: float,
+    y: float,
+    z: float,
+) -> tuple[float, float, float, float]:
+    """Of the shapes of a union, distance and normal of one that stands in the way of a step along a face.
+
+    Args:
+        proxy: the proxy.
+        others: the other shapes of its solid.
+        voxels: the distances of its fields.
+        gx: a point on the face, with gy and gz [m].
+        gy: see gx.
+        gz: see gx.
+        nx: the face's normal, with ny and nz.
+        ny: see nx.
+        nz: see nx.
+        tx: the step, with ty and tz, not 0 [m].
+        ty: see tx.
+        tz: see tx.
+        x: from the point to where it has landed on the surface, with y and z [m].
+        y: see x.
+        z: see x.
+
+    Returns:
+        Less than `-SURFACE_M` where none does, or the step has ended before it.
+    """
+    length = sqrt(tx * tx + ty * ty + tz * tz)
+    tx /= length
+    ty /= length
+    tz /= length
+    gone = 0.0
+    for _ in range(_STEPS):
+        d, mx, my, mz = ahead(
+            proxy, others, voxels, gx + gone * tx, gy + gone * ty, gz + gone * tz, nx, ny, nz, length - gone
+        )
+        if d < -SURFACE_M:
+            break
+        against = tx * mx + ty * my + tz * mz
+        if d < SURFACE_M and against < 0.0:
+            x -= gone * tx
+            y -= gone * ty
+            z -= gone * tz
+            behind = -(x * mx + y * my + z * mz)
+            if behind > SURFACE_M and behind * behind > _BEHIND * (x * x + y * y + z * z):
+                return -gone * against, mx, my, mz
+            break
+        gone += d if d > SURFACE_M else SURFACE_M
+        if gone >= length:
+            break
+    return -1.0, nx, ny, nz
 
 
 def trace(

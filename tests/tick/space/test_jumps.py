@@ -14,7 +14,7 @@ from functools import cache
 from itertools import product
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hapticd.shapes.solid import Proxy
@@ -190,6 +190,9 @@ def test_no_force_grows_or_turns_round_by_more_than_the_device_moved(name: str) 
 
     @examples(4)
     @given(seed=seeds, speed=speeds, law=laws, friction=st.sampled_from([None, (0.8, 0.3)]))
+    @example(seed=1683920953, speed=0.05, law="none", friction=(0.8, 0.3))  # deep beside a wall of the notch
+    @example(seed=1725604709, speed=0.3, law="none", friction=None)  # and near its end
+    @example(seed=1994430969, speed=0.3, law="none", friction=(0.8, 0.3))  # and near its back
     def hold(seed: int, speed: float, law: str, friction: tuple[float, float] | None) -> None:
         text = scene
         if friction:
