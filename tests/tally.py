@@ -60,7 +60,7 @@ class Tally:
         return self._counts.get(test, Count()).passes
 
     def done(self, test: str, times: int) -> bool:
-        """Whether a test has passed so many times in a row, or once if it needs no daemon."""
+        """Whether a test has passed this often in a row, or once if it needs no daemon."""
         count = self._counts.get(test, Count())
         return count.passes >= (times if count.daemon else 1)
 

@@ -14,7 +14,7 @@ _STEPS = 48
 _BEYOND_M = 4.0 * SURFACE_M
 _AGAINST = -0.9
 _FACE = 0.98
-_BEHIND = 0.04
+_BEHIND = 0.04  # a landing 11 degrees behind a shape's face is not on its near side, round as it may be
 _LANDINGS = 4
 
 

@@ -59,7 +59,7 @@ def switched(scene: str, law: str | None = None) -> Act:
 
 
 def with_a_law_that_fails(calls: int) -> Act:
-    """It goes well for so many calls."""
+    """It goes well for a number of calls, and fails at the next."""
 
     def act(rig: Rig) -> None:
         done = 0
@@ -115,7 +115,7 @@ def go_through(
     middle_m: Point = (0.0, 0.0, 0.0),
     placed: Callable[[Point], Point] = lambda at: at,
 ) -> list[Moment]:
-    """Let a hand go about a point, and do at some ticks what is to be done; what is told after each.
+    """Let a hand go about a point, and do at some ticks what is to be done; the record after each.
 
     Args:
         rig: not yet started.
