@@ -29,7 +29,11 @@ from tests.doctor.machine import says
 from tests.views.xdf import write_xdf
 
 CONFIG = Path(__file__).parent.parent.parent / "config"
-LOOPBACK = "[lab]\nKnownPeers = {127.0.0.1}\n[multicast]\nResolveScope = machine\n[log]\nlevel = -3\n"
+# A session of its own: another worker's streams have the same names, and a reader would take either.
+LOOPBACK = (
+    f"[lab]\nKnownPeers = {{127.0.0.1}}\nSessionID = tests-{os.getpid()}\n"
+    "[multicast]\nResolveScope = machine\n[log]\nlevel = -3\n"
+)
 TICKS = 1500
 
 # In a process of its own: liblsl's threads and its configuration stay out of the other tests.
@@ -83,7 +87,8 @@ def streamed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any
                     _, tick = next(maps)
                     deadlines_ns[tick["seq"]] = tick["deadline_ns"]
                 subprocess.run([HAPTICD, "mark", "go <1>"], env=environment, check=True, capture_output=True)
-                told = reader.communicate(timeout=2 * PATIENCE_S)[0]
+                told, complained = reader.communicate(timeout=2 * PATIENCE_S)
+                assert reader.returncode == 0, complained
             open_to_all = endpoints.streams()
             bridge.send_signal(signal.SIGINT)
             said, warned = bridge.communicate(timeout=PATIENCE_S)
