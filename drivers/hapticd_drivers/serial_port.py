@@ -1,15 +1,20 @@
 """A serial port opened by pyserial, then read and written directly, since a tick must never wait.
 
-pyserial's own `write` tries again and again while the port takes no more, even when told not to wait.
+pyserial's own `write` tries again and again while the port takes no more, even when told not to wait. And what has come
+is brought by a worker of the kernel that is no real-time task: where there is nothing to read yet, `read`, `select` and
+`poll` wait until it has done what it has to do (`n_tty.c`), up to 0.2 s on a busy computer. Asking how many bytes are
+there does not wait, so only what is there is read.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
-import select
 import termios
+import time
+from array import array
 
 import serial
 
@@ -20,6 +25,12 @@ from hapticd.errors import (
     DevicePermissionError,
     DriverError,
 )
+
+NAP_S = 5e-5
+"""Least time between two looks while something is waited for [s]."""
+
+NAP_SHARE = 0.1
+"""Of what has been waited for, the time until the next look: what comes late is seen little later."""
 
 
 class SerialPort:
@@ -47,6 +58,7 @@ class SerialPort:
         self._driver = driver
         self._path = path
         self._rest = b""  # of a frame that has gone out in part
+        self._there = array("i", [0])  # bytes that can be read
 
     def send(self, frame: bytes) -> None:
         """Send a frame, after what is left of the one before, or drop it.
@@ -71,6 +83,8 @@ class SerialPort:
         Raises:
             DeviceDisconnectedError: the port is gone.
         """
+        if not self._can_read():
+            return b""
         try:
             return os.read(self.descriptor, most)
         except BlockingIOError:
@@ -79,8 +93,17 @@ class SerialPort:
             raise self._gone(error) from None
 
     def wait(self, timeout_s: float) -> None:
-        """Return when something may have come, or after this time [s]."""
-        select.select([self.descriptor], [], [], timeout_s)
+        """Return when something has come, or after this time [s].
+
+        Raises:
+            DeviceDisconnectedError: the port is gone.
+        """
+        begin_s = time.monotonic()
+        while not self._can_read():
+            waited_s = time.monotonic() - begin_s
+            if waited_s >= timeout_s:
+                return
+            time.sleep(min(max(NAP_S, NAP_SHARE * waited_s), timeout_s - waited_s))
 
     def close(self, last: bytes = b"") -> None:
         """Give it back, these bytes sent before where that is still possible."""
@@ -89,6 +112,13 @@ class SerialPort:
                 self._write(last)
         with contextlib.suppress(OSError, serial.SerialException):
             self.port.close()
+
+    def _can_read(self) -> bool:
+        try:
+            fcntl.ioctl(self.descriptor, termios.FIONREAD, self._there)
+        except OSError as error:
+            raise self._gone(error) from None
+        return self._there[0] > 0
 
     def _write(self, data: bytes) -> int:
         try:

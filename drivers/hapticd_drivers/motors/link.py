@@ -49,7 +49,11 @@ class BusLink(Protocol):
         """
 
     def wait(self, timeout_s: float) -> None:
-        """Return when something may have come, or after this time [s]."""
+        """Return when something may have come, or after this time [s].
+
+        Raises:
+            DeviceDisconnectedError: the adapter is gone.
+        """
 
     def close(self) -> None:
         """Give it back; never raises."""

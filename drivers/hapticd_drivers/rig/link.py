@@ -39,7 +39,11 @@ class Link(Protocol):
         """
 
     def wait(self, timeout_s: float) -> None:
-        """Return when something may have come, or after so long [s]."""
+        """Return when something may have come, or after so long [s].
+
+        Raises:
+            DeviceDisconnectedError: the link is gone.
+        """
 
     def close(self) -> None:
         """Give it back; never raises."""

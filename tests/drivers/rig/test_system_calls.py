@@ -31,7 +31,7 @@ auto_arm = true
 
 @pytest.mark.nightly  # a rig that a busy computer keeps from answering is lost
 def test_a_tick_on_a_serial_line_reads_and_writes_the_line(rig_core: ctypes.CDLL, tmp_path: Path) -> None:
-    """One write a tick, and one read, or where the state is still under way one before and one after a wait for it."""
+    """One write and one read a tick, and looks whether something has come: more where the state is still under way."""
     with Rig(rig_core, tmp_path / "port", pace="real") as rig:
         rig.set_home()
         config = UNHURRIED + CONFIG.format(driver="serial-rig", options=f'port = "{rig.port}"')
@@ -39,10 +39,10 @@ def test_a_tick_on_a_serial_line_reads_and_writes_the_line(rig_core: ctypes.CDLL
     line = [(name, arguments) for name, arguments in found if name not in LOOP]
     assert all("</dev/pts/" in arguments for _, arguments in line)
     counts = Counter(name for name, _ in line)
-    assert set(counts) <= {"write", "read", "pselect6"}, counts
+    assert set(counts) <= {"write", "read", "ioctl"}, counts
     assert counts["write"] <= TICKS
-    assert TICKS - 1 <= counts["read"] <= TICKS + counts["pselect6"]
-    assert counts["pselect6"] <= TICKS
+    assert counts["read"] <= TICKS + 1
+    assert counts["read"] <= counts["ioctl"] <= 8 * TICKS
 
 
 @pytest.mark.nightly
