@@ -102,7 +102,7 @@ def listen(talk: Talk) -> Journal:
 def _let_go_and_arm(rig: Rig, tick: int) -> None:
     if tick == 830:
         rig.tick.start(rig.sample)
-        rig.force = [0.0] * len(rig.force)
+        rig.force, rig.pulled = [0.0] * len(rig.force), []
     if tick % 400 == 370:
         rig.tick.release()
     if tick % 400 == 399 or tick == 850:

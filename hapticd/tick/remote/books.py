@@ -27,6 +27,8 @@ class PortBooks:
         "_gain",
         "_limit_n",
         "_lost_j",
+        "_spread_j",
+        "_spread_spring_j",
         "_spring_j",
         "_stiffness",
         "_waits",
@@ -42,6 +44,7 @@ class PortBooks:
         self.carried_j = 0.0
         self._stiffness = Ramped(0.0)
         self._gain = self._weight = self._limit_n = 0.0
+        self._spread_j = self._spread_spring_j = 0.0
         self._forget_wait()
 
     def carry(self, work_j: float) -> None:
@@ -53,6 +56,16 @@ class PortBooks:
         """Take for the client's own what the ledger has entered as a gain of the device's [J]."""
         self.moved_j += work_j
         self.ledger.dissipated_j += work_j
+
+    def spread(self, taken_j: float, spring_j: float) -> None:
+        """Keep for the next entry what the device took beyond what it would have under the last tick's force [J].
+
+        Args:
+            taken_j: from all of what was applied.
+            spring_j: from the spring's part.
+        """
+        self._spread_j = taken_j
+        self._spread_spring_j = spring_j
 
     def enter(
         self, taken_j: float, spring_j: float, stretch_m: float, in_contact: bool, damping_n_s_per_m: float, dt_s: float
@@ -75,6 +88,9 @@ class PortBooks:
             taken_j += self._carried_j
             spring_j += self._spring_j
             self._forget_wait()
+        taken_j += self._spread_j
+        spring_j += self._spread_spring_j
+        self._spread_j = self._spread_spring_j = 0.0
         stored_j = self._gain * self._weight * self._stiffness.stored(stretch_m, self._limit_n)
         self.ledger.update(-1.0, taken_j, spring_j, stored_j, in_contact, damping_n_s_per_m, dt_s)
 

@@ -60,6 +60,7 @@ class OnePort(Port):
         "_outside_s",
         "_period_s",
         "_sample_s",
+        "_waited_s",
         "_waits",
         "asleep",
         "books",
@@ -90,6 +91,7 @@ class OnePort(Port):
         self._begun = False  # since its weight was 0
         self._waits = False  # it has gone on since the last sample
         self._sample_s = 0.0  # of a sample that no law has been shown yet
+        self._waited_s = 0.0  # since the last sample that laws have been shown
         self._outside_s = self._most_change_n = 0.0
         self._from_m = [0.0] * axes  # where the device was
 
@@ -169,6 +171,9 @@ class OnePort(Port):
         if self.asleep:
             return
         passed_s = periods * self._period_s
+        self._waited_s += passed_s
+        for channel in self.channels:
+            channel.wait(passed_s)
         self._waits = self._begun and self._wait(max(passed_s, LEAST_S))
         self._go_on(passed_s)
         for channel in self.channels:
@@ -240,6 +245,17 @@ class OnePort(Port):
         """Keep for the books what became of it in such a tick."""
         raise NotImplementedError
 
+    def _enter_spread(self, taken_j: float, spring_j: float, own_j: float) -> None:
+        """Keep for the books what the device took beyond what it would have under the last tick's force [J].
+
+        Args:
+            taken_j: from all of what was applied.
+            spring_j: from the spring's part.
+            own_j: from the part that is not the law's.
+        """
+        del own_j
+        self.books.spread(taken_j, spring_j)
+
     def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
         """Enter a tick into the books: first the motion, then what has become of the port."""
         x_squared = taken_j = spring_j = 0.0
@@ -292,6 +308,8 @@ class OnePort(Port):
         Both clocks tell the time since the last sample where that was seen in the last tick. Where ticks went by in
         between, only this computer's tells what is left of it.
         """
+        if self._waited_s > 0.0:
+            self._spread(passed_s)
         if self.state is not _HELD and self.weight == 0.0:
             self._see_outside(dt_s)
             return
@@ -305,6 +323,22 @@ class OnePort(Port):
         self._waits = False
         self._see(dt_s, moved_s)
         self._from_m[:] = position_m
+
+    def _spread(self, passed_s: float) -> None:
+        """Have books and laws reckon with the mean of what was applied since the last sample.
+
+        The device has moved for all that time, as far as is known evenly, and not with the last tick's force alone.
+        """
+        waited_s = self._waited_s + passed_s
+        self._waited_s = 0.0
+        taken_j = spring_j = own_j = 0.0
+        for axis, channel in enumerate(self.channels):
+            way_m = self.motion.position_m[axis] - self._from_m[axis]
+            more_n, more_spring_n, more_own_n = channel.spread(passed_s, waited_s)
+            taken_j -= more_n * way_m
+            spring_j -= more_spring_n * way_m
+            own_j -= more_own_n * way_m
+        self._enter_spread(taken_j, spring_j, own_j)
 
     def _see_outside(self, dt_s: float) -> None:
         """See a sample while nothing is in force; laws that keep time are asked on for a while."""
@@ -321,7 +355,7 @@ class OnePort(Port):
         self.asleep = True
         self.weight = self.scale = self._outside_s = 0.0
         self._begun = self._waits = False
-        self._sample_s = 0.0
+        self._sample_s = self._waited_s = 0.0
         self.books.let_go()
         for axis, channel in enumerate(self.channels):
             channel.rest()
@@ -345,7 +379,7 @@ class PortAxis(Channel):
         own_n: the part of what is applied that is not the law's [N].
     """
 
-    __slots__ = ("_leads", "asked_n", "make_law", "own_n", "port")
+    __slots__ = ("_applied_n_s", "_held_n_s", "_leads", "_own_n_s", "asked_n", "make_law", "own_n", "port")
 
     port: OnePort
 
@@ -355,6 +389,7 @@ class PortAxis(Channel):
         self.wall = Line(axis)  # type: ignore[assignment]  # stands for a wall, see there
         self.awake = False
         self.asked_n = self.own_n = 0.0
+        self._applied_n_s = self._held_n_s = self._own_n_s = 0.0  # since the last sample, up to the last tick
         self._leads = axis == 0
 
     def start(self, position_m: float) -> None:
@@ -432,6 +467,36 @@ class PortAxis(Channel):
         self.requested_n += contact_n - self._contact_n
         self.tick.contact_n = self._contact_n = contact_n
         self.wall.spring_n = spring_n
+
+    def rest(self) -> None:
+        """Be out of touch, at rest and without force."""
+        super().rest()
+        self._applied_n_s = self._held_n_s = self._own_n_s = 0.0
+
+    def wait(self, passed_s: float) -> None:
+        """Keep what was applied until this tick, which has no new sample [s]."""
+        self._applied_n_s += self.applied_n * passed_s
+        self._held_n_s += self.held_n * passed_s
+        self._own_n_s += self.own_n * passed_s
+
+    def spread(self, passed_s: float, waited_s: float) -> tuple[float, float, float]:
+        """Show the law the mean of what was applied since the last sample.
+
+        Args:
+            passed_s: time since the last tick [s].
+            waited_s: since the last sample, more than 0 [s].
+
+        Returns:
+            By how much the mean is more than what was applied last: of all, of the spring's part, and of the part that
+            is not the law's [N].
+        """
+        mean_n = (self._applied_n_s + self.applied_n * passed_s) / waited_s
+        mean_held_n = (self._held_n_s + self.held_n * passed_s) / waited_s
+        mean_own_n = (self._own_n_s + self.own_n * passed_s) / waited_s
+        self._applied_n_s = self._held_n_s = self._own_n_s = 0.0
+        self.tick.applied_n = mean_n
+        self.tick.applied_contact_n = mean_own_n
+        return mean_n - self.applied_n, mean_held_n - self.held_n, mean_own_n - self.own_n
 
     def apply_scaled(self, share: float, scale: float) -> None:
         """Remember what is applied from now on.

@@ -95,6 +95,10 @@ class StreamedForce(OnePort):
             self._now_n[axis] += share * way_n[axis]
             channel.push(self._now_n[axis])
 
+    def _enter_spread(self, taken_j: float, spring_j: float, own_j: float) -> None:
+        super()._enter_spread(taken_j, spring_j, own_j)
+        self.books.give(-own_j)
+
     def _enter(self, gain: float, limit_n: float, dt_s: float) -> None:
         """The client's own part of the force is its work, and the law's is lost."""
         super()._enter(gain, limit_n, dt_s)

@@ -86,7 +86,11 @@ def update(seq: int = 0, released: bool = False, **said: Any) -> Update:
 
 
 class Rig:
-    """A tick that is shown positions and told updates, and the work of the forces that it gave."""
+    """A tick that is shown positions and told updates, and the work of the forces that it gave.
+
+    Between two samples the device has moved evenly, a tick like the next, as couplings and forces reckon; what walls
+    and objects hold counts as held since the sample before.
+    """
 
     def __init__(
         self, scene: str = COUPLING, law: str = "none", axes: str = "x", arm: bool = True, safety: str = "", **info: Any
@@ -97,6 +101,7 @@ class Rig:
         self.sample = Sample(len(axes))
         self.at = [0.0] * len(axes)
         self.force: list[float] = [0.0] * len(axes)
+        self.pulled: list[list[float]] = []  # since the last sample, up to the last tick
         self.energy_j = 0.0
         self.seq = 0
         self.tick.start(self.sample)
@@ -122,7 +127,12 @@ class Rig:
             if at is not None:
                 moved = [to - of for to, of in zip(at, self.at, strict=True)]
                 self.energy_j -= sum(f * m for f, m in zip(self.force, moved, strict=True))
+                last = self.pull()
+                for each in self.pulled:
+                    more = apart_each(each, last)
+                    self.energy_j -= sum(f * m for f, m in zip(more, moved, strict=True)) / (len(self.pulled) + 1)
                 self.at = list(at)
+            self.pulled = []
             self.sample.position_m[:] = self.at
             self.sample.time_ns += round(dt_s * 1e9)
             self.sample.sequence += 1
@@ -132,8 +142,16 @@ class Rig:
     def repeat(self, ticks: int = 1) -> list[float]:
         """Have the device say nothing new for some ticks; the force."""
         for _ in range(ticks):
+            self.pulled.append(self.pull())
             self.force = list(self.tick.advance(self.sample, PERIOD_S))
         return self.force
+
+    def pull(self) -> list[float]:
+        """What couplings and forces apply, those that fade out too."""
+        force_n = [0.0] * len(self.at)
+        for axis in self.tick.own_ports.axes:
+            force_n[axis.wall.axis] += axis.applied_n
+        return force_n
 
     def switch(self, scene: str | None = None, law: str | None = None) -> None:
         """Reload another scene, or another law, without a tick in between."""
@@ -184,5 +202,9 @@ def length(vector: Iterable[float]) -> float:
     return float(sum(value * value for value in vector) ** 0.5)
 
 
+def apart_each(a: Iterable[float], b: Iterable[float]) -> list[float]:
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
 def apart(a: Iterable[float], b: Iterable[float]) -> float:
-    return length(x - y for x, y in zip(a, b, strict=True))
+    return length(apart_each(a, b))
