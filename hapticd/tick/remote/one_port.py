@@ -285,9 +285,8 @@ class OnePort(Port):
             self._begun = False  # who speaks from now on begins where the device is, with the next sample
         goal_n = self.limits.max_force_n
         if self.most_n != goal_n:
-            change_n = self._most_change_n * step
-            most_n = self.most_n + change_n
-            self.most_n = min(goal_n, most_n) if change_n > 0.0 else max(goal_n, most_n)
+            most_n = self.most_n + self._most_change_n * step
+            self.most_n = min(goal_n, most_n) if self._most_change_n > 0.0 else max(goal_n, most_n)
 
     def _limit(self) -> None:
         """Bring what the laws ask for under ramp and limit."""

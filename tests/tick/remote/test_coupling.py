@@ -11,7 +11,7 @@ import pytest
 from hapticd.offline.operations import count_operations, operations_by_code
 from hapticd.tick.remote.follower import HASTE_PER_S
 from hapticd.tick.remote.port import PortState
-from tests.tick.remote.rig import COUPLING, MOST_N, PERIOD_S, RAMP_S, WALL, Rig, apart, length, update
+from tests.tick.remote.rig import COUPLING, MOST_N, PERIOD_S, PROMPT, RAMP_S, WALL, Rig, apart, length, update
 
 K, B, FASTEST = 2000.0, 5.0, 1.0
 RAMP_TICKS = round(RAMP_S / PERIOD_S)
@@ -262,6 +262,21 @@ def test_it_goes_on_under_its_name_through_a_reload_and_fades_out_with_the_scene
     rig.switch(COUPLING)
     assert rig["tool"] is not port
     assert rig.unbalanced_j() < 1e-9
+
+
+@pytest.mark.parametrize("most_n", [MOST_N + 0.8, MOST_N - 0.8])
+def test_another_limit_stays_where_it_is_in_ticks_in_which_no_time_passes(most_n: float) -> None:
+    """A real device, on a computer whose clock stood still, or went back."""
+    rig = Rig(COUPLING + PROMPT, simulated=False)
+    for _ in range(200):
+        rig.say("tool", position_m=[0.05])
+        rig.go()
+    rig.switch(COUPLING.replace(f"max_force_n = {MOST_N}", f"max_force_n = {most_n}") + PROMPT)
+    rig.go()
+    before = rig.force
+    for passed_s in (0.0, -1.0):
+        assert list(rig.tick.advance(rig.sample, passed_s)) == pytest.approx(before, abs=0.8 / 50 + 1e-9)
+    assert before != pytest.approx([most_n], abs=0.1)
 
 
 @pytest.mark.parametrize("most_n", [MOST_N + 0.8, MOST_N - 0.8])
