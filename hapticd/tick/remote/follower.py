@@ -19,7 +19,8 @@ class Follower:
 
     where e is the way from the client's target, moved on with its velocity, to the followed one: it dies away without
     passing through 0 (both poles are p), whatever dt is. From one tick to the next the followed target moves by at most
-    s dt, at a speed that differs by at most h s dt from the one before, with s the largest and h = `HASTE_PER_S`.
+    s dt, at a speed that differs by at most h s dt from the one before, with s the largest and h = `HASTE_PER_S`. Where
+    s is made less, the speed comes down to it at that rate, since a damper takes it for a force.
 
     Args:
         axes: how many.
@@ -106,9 +107,10 @@ class Follower:
         gain = HASTE_PER_S * most * dt_s
         speed_m_per_s = self.speed_m_per_s
         wanted = []
-        change_squared = 0.0
+        change_squared = before_squared = 0.0
         for axis in self._axes:
             before = speed_m_per_s[axis]
+            before_squared += before * before
             goal_m_per_s = goal_share * self._goal_m_per_s[axis]
             off_m = self.at_m[axis] - self._goal_m[axis]
             self._goal_m[axis] += goal_m_per_s * dt_s
@@ -119,6 +121,8 @@ class Follower:
             share = gain / sqrt(change_squared)
             for axis in self._axes:
                 wanted[axis] = speed_m_per_s[axis] + share * (wanted[axis] - speed_m_per_s[axis])
+        if before_squared > most * most:  # the limit has come down: the speed goes after it
+            most = max(most, sqrt(before_squared) - gain)
         share = _share(wanted, self._axes, most)
         moving = False
         for axis in self._axes:

@@ -292,6 +292,24 @@ def test_another_limit_is_gone_over_to_by_the_ramp_however_near_it_is(most_n: fl
     assert forces[-1] == pytest.approx(most_n)
 
 
+@pytest.mark.parametrize("axes", ["x", "xyz"])
+def test_a_target_that_is_to_be_slower_after_a_reload_slows_down_without_a_step_of_force(axes: str) -> None:
+    soft = COUPLING.replace("2000.0", "100.0") + PROMPT  # so that no limit hides the damper
+    rig = Rig(soft, axes=axes)
+    away = [0.1] * len(axes)
+    held_at(rig, [0.0] * len(axes), 100)
+    held_at(rig, away, 4)
+    assert length(rig["tool"].follower.speed_m_per_s) > 0.9
+    slow_m_per_s = 0.2
+    rig.switch(soft + f"max_speed_m_per_s = {slow_m_per_s}\n")
+    for _ in range(60):
+        before, target_m = rig.force, list(rig["tool"].target_m)
+        held_at(rig, away, 1)
+        way_m = apart(rig["tool"].target_m, target_m)
+        assert apart(rig.force, before) <= 100.0 * way_m + B * HASTE_PER_S * slow_m_per_s * PERIOD_S * (1.0 + 1e-9)
+    assert way_m == pytest.approx(slow_m_per_s * PERIOD_S)
+
+
 def test_another_law_for_walls_is_none_for_a_coupling() -> None:
     rig = Rig(COUPLING + WALL)
     held_at(rig, [2e-3], 300)
