@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from urllib.parse import urlsplit
 
 from pydantic import Field
 
@@ -137,7 +138,8 @@ class Inverse3(Driver[Inverse3Options]):
                 "it up, or say which one"
             )
         self._device = wanted[0]
-        self._claims.take("inverse3", f"{self._device} at {options.url}")
+        # This computer's service has many names: localhost, 127.0.0.1, ::1, the computer's own.
+        self._claims.take("inverse3", f"{self._device} of the service at port {urlsplit(options.url).port or 80}")
         self._silent = 0
         self._seen = courier.exchanges
         self._sample.sequence = 0

@@ -121,8 +121,8 @@ def test_disable_and_close_leave_a_force_of_zero(service: FakeService) -> None:
 def test_a_second_program_is_refused_the_same_device_until_the_first_has_closed_it(service: FakeService) -> None:
     """The service lets any number of clients in, and a second one's zero force would take the first one's away."""
     first = pressing(service)
-    second = Inverse3(Inverse3Options(url=service.url), 0.001)
-    with pytest.raises(DeviceBusyError, match="another program of hapticd has 049D"):
+    second = Inverse3(Inverse3Options(url=service.url.replace("127.0.0.1", "localhost")), 0.001)
+    with pytest.raises(DeviceBusyError, match=r"has 049D of the service at port [0-9]+: end it first"):
         second.open()
     assert service.cursor.force_n == [0.0, 0.0, PUSH_N]
     first.close()
