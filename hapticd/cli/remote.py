@@ -5,8 +5,10 @@ Also the options that say which daemon: one of this computer by its name, or ano
 
 from __future__ import annotations
 
+import signal
 import time
 from pathlib import Path
+from types import FrameType
 from typing import Annotated
 
 import typer
@@ -18,6 +20,7 @@ from hapticd.errors import InstanceError
 from hapticd.paths import CONTROL, DEFAULT_INSTANCE, alive, locate
 
 _ENDED_S = 15.0  # a ramp, and a driver that takes its time to let go of a device
+_CALL_OFF = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 Instance = Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.", autocompletion=instances)]
 Connect = Annotated[
@@ -130,23 +133,33 @@ def calibrate(
 ) -> None:
     """Calibrate a running daemon's device, which moves its arm.
 
-    Let go of the arm and clear its workspace. Ctrl-C calls it off, during the countdown and afterwards, and so does
-    `hapticd disarm`. The daemon must be disarmed, and goes on streaming positions.
+    Let go of the arm and clear its workspace. Ctrl-C calls it off, during the countdown and afterwards, and so do
+    SIGTERM, a terminal that is closed, and `hapticd disarm`. The daemon must be disarmed, and goes on streaming positions.
 
     Example: hapticd calibrate --countdown 10
     """
     # First: is there a daemon, and will it? A countdown says that the arm will move.
     if command("status", instance, connect=connect, keys=keys)["status"]["armed"]:
         raise RefusedError("calibration moves the arm by itself: `hapticd disarm` first")
-    for left_s in range(countdown_s, 0, -1):
-        typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
-        time.sleep(1.0)
-    typer.echo("calibrating", err=True)
+    for number in _CALL_OFF:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup wants it to go on
+            signal.signal(number, _call_off)
     try:
+        for left_s in range(countdown_s, 0, -1):
+            typer.echo(f"the arm will move by itself in {left_s} s; Ctrl-C to call it off", err=True)
+            time.sleep(1.0)
+        typer.echo("calibrating", err=True)
         commands.calibrate(instance, connect, keys)
     except KeyboardInterrupt:
         typer.echo("called off", err=True)
         raise
+
+
+def _call_off(_signal: int, _frame: FrameType | None) -> None:
+    """Interrupt once: a second signal, as impatience or a closing terminal sends it, must not keep the arm moving."""
+    for number in _CALL_OFF:
+        signal.signal(number, lambda *_: None)
+    raise KeyboardInterrupt
 
 
 def reload(

@@ -173,11 +173,14 @@ def calibrate(instance: str = DEFAULT_INSTANCE, connect: str | None = None, keys
         keys: key file for it; None: the one that $HAPTICD_KEYS names.
 
     Raises:
-        ConfigError, InstanceError, RefusedKeyError, RefusedError: as `command`.
+        ConfigError, InstanceError, RefusedKeyError, RefusedError: as `command`, or it could not be called off.
         KeyboardInterrupt: it was called off.
     """
     try:
         command("calibrate", instance, CALIBRATION_TIMEOUT_S, connect, keys)
     except KeyboardInterrupt:
-        command("disarm", instance, connect=connect, keys=keys)
+        try:
+            command("disarm", instance, connect=connect, keys=keys)
+        except HapticdError as error:
+            raise InstanceError(f"not called off: {error}; if the arm still moves, switch the device off") from error
         raise

@@ -286,7 +286,12 @@ def test_a_calibration_that_moves_the_arm_ends_when_somebody_disarms_or_stops_th
     assert lab.look().get("mode") == RESET
 
 
-def test_ctrl_c_on_the_command_ends_a_calibration_while_the_arm_moves(lab: Lab) -> None:
+SIGNALS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+
+
+@SIGNALS
+def test_a_signal_to_the_command_ends_a_calibration_while_the_arm_moves(lab: Lab, number: int) -> None:
+    """Two of them, as impatience sends and a terminal that closes: the second one cut off what the first had asked."""
     assert lab.ask("disarm") == ""
     wait_until(lambda: lab.look().get("mode") == BRAKE, "the ramp to end")
     lab.look().set(hand_n=[0.0, 0.0, 0.0], calibrated=0, auto_init_us=600_000_000)
@@ -294,8 +299,23 @@ def test_ctrl_c_on_the_command_ends_a_calibration_while_the_arm_moves(lab: Lab) 
     environment = {**os.environ, "HAPTICD_RUNTIME_DIR": f"{lab.daemon.directory}/run"}
     with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as calibrating:
         wait_until(lambda: lab.look().get("moves") == 1, "the arm to move")
-        calibrating.send_signal(signal.SIGINT)
+        calibrating.send_signal(number)
+        calibrating.send_signal(signal.SIGTERM)
         _, said = calibrating.communicate(timeout=60.0)
     assert (calibrating.returncode, said.splitlines()) == (130, ["calibrating", "called off"])
     wait_until(lambda: "calibrating" not in lab.ask("arm"), "the calibration to end")
     assert lab.look().get("mode") == RESET
+
+
+@SIGNALS
+def test_a_signal_to_the_command_while_it_counts_down_leaves_the_arm_where_it_is(lab: Lab, number: int) -> None:
+    assert lab.ask("disarm") == ""
+    command = [HAPTICD, "calibrate", "--countdown", "60"]
+    environment = {**os.environ, "HAPTICD_RUNTIME_DIR": f"{lab.daemon.directory}/run"}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as calibrating:
+        assert calibrating.stderr is not None
+        assert "in 60 s" in calibrating.stderr.readline()
+        calibrating.send_signal(number)
+        said = calibrating.stderr.read()
+    assert (calibrating.returncode, said.splitlines()[-1]) == (130, "called off")
+    assert lab.look().get("moves") == 0
