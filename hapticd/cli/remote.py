@@ -134,7 +134,7 @@ def calibrate(
     """Calibrate a running daemon's device, which moves its arm.
 
     Let go of the arm and clear its workspace. Ctrl-C calls it off, during the countdown and afterwards, and so do
-    SIGTERM, a terminal that is closed, and `hapticd disarm`. The daemon must be disarmed, and goes on streaming positions.
+    SIGTERM, a terminal that is closed, and `hapticd disarm`. The daemon must be disarmed, and goes on streaming.
 
     Example: hapticd calibrate --countdown 10
     """

@@ -6,12 +6,12 @@ import grp
 import os
 import re
 import shlex
-import stat
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hapticd.errors import ConfigError
 from hapticd.keys.file import Key, KeyWriteError, new_pair, read, write
+from hapticd.keys.owners import require_ours
 from hapticd.paths import home_directory, make_directory
 
 SYSTEM_KEYS = Path("/etc/hapticd/keys")
@@ -83,7 +83,7 @@ class KeyDirectory:
         """The daemon's own pair; None when none has been made.
 
         Raises:
-            ConfigError: it cannot be used, or everybody may change it.
+            ConfigError: it cannot be used, or others may change it.
         """
         path = self.path / _SERVER
         try:
@@ -101,7 +101,7 @@ class KeyDirectory:
         """Listed keys by name, in the order of names.
 
         Raises:
-            ConfigError: one of them cannot be used, everybody may change what is listed, or two are the same.
+            ConfigError: one of them cannot be used, others may change what is listed, or two are the same.
         """
         clients: dict[str, Key] = {}
         names: dict[str, Path] = {}
@@ -179,12 +179,7 @@ class KeyDirectory:
         if path.exists() and not os.access(path, os.R_OK):
             raise self._closed(path)
         key = read(path)
-        for changed in (self.path, path.parent, path):
-            if changed.stat().st_mode & stat.S_IWOTH:
-                raise ConfigError(
-                    f"{changed}: everybody may change it, and so let anyone in: chmod o-w {shlex.quote(str(changed))}, "
-                    "and look who is listed (`hapticd keys`)"
-                )
+        require_ours(path)
         return key
 
     def _closed(self, path: Path) -> ConfigError:

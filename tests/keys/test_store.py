@@ -234,6 +234,52 @@ def test_keys_that_everybody_may_change_let_no_one_in(keys: KeyDirectory, change
     assert list(keys.clients()) == ["laptop"]
 
 
+@pytest.mark.parametrize(("mode", "who", "remedy"), [(0o757, "everybody", "o-w"), (0o775, "group guests", "g-w")])
+def test_a_directory_above_the_keys_that_others_may_change_lets_no_one_in(
+    mode: int, who: str, remedy: str, keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its users could put another directory of keys in the place of this one."""
+    monkeypatch.setattr("grp.getgrgid", lambda _: SimpleNamespace(gr_name="guests", gr_mem=[]))
+    keys.make()
+    above = keys.path.parent
+    above.chmod(mode)
+    with pytest.raises(ConfigError, match=f"^{above}: {who} may change it, .*chmod {remedy} {above},"):
+        keys.pair()
+    above.chmod(mode | stat.S_ISVTX)  # as /tmp has it
+    assert keys.pair()
+
+
+def test_its_owners_private_group_may_change_a_directory_above_the_keys(
+    keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So a umask of 002 makes them in a home directory."""
+    members = ["lab"]
+    monkeypatch.setattr("pwd.getpwuid", lambda _: SimpleNamespace(pw_name="lab"))
+    monkeypatch.setattr("grp.getgrgid", lambda _: SimpleNamespace(gr_name="lab", gr_mem=members))
+    keys.make()
+    keys.path.parent.chmod(0o775)
+    assert keys.pair()
+    members.append("guest")
+    with pytest.raises(ConfigError, match="group lab may change it"):
+        keys.pair()
+
+
+def test_a_directory_of_another_user_above_the_keys_lets_no_one_in(
+    keys: KeyDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    above, look = keys.path.parent, Path.stat
+
+    def seen(path: Path, **options: bool) -> os.stat_result:
+        found = list(look(path, **options))
+        found[stat.ST_UID] += 70000 if path == above else 0
+        return os.stat_result(found)
+
+    keys.make()
+    monkeypatch.setattr(Path, "stat", seen)
+    with pytest.raises(ConfigError, match=f"^{above}: user [0-9]+ may change it, .*sudo chown root {above},"):
+        keys.pair()
+
+
 def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(KeyWriteError, match=f"{tmp_path}/file/keys: Not a directory"):
