@@ -303,13 +303,20 @@ def test_a_fault_is_held_said_and_cleared(page: Page, daemon: Daemon) -> None:
     """Over-speed stops the daemon; what the hand did before is in the picture."""
     page.click("#span button:nth-child(1)")
     page.click("#trigger button:nth-child(4)")
+    page.call("Emulation.setTimezoneOverride", timezoneId="Asia/Kolkata")
     apply(page, "safety.max_speed_m_per_s", "0.001")
     state(page, "Fault")
-    assert "Over-speed" in page.evaluate("document.getElementById('fault').innerText")
+    fault = page.evaluate("document.getElementById('fault').innerText")
+    assert re.search(r"Over-speed at \d\d:\d\d:\d\d \+0530\.", fault)
     picture = page.picture()
     assert tuple(picture[20, 200]) == (179, 33, 26)  # the colour of faults
     page.wait_inside("page.trigger.state === 'held' && page.view.held !== null")
     assert page.inside("page.view.ring.time(0) < page.trigger.at && page.trigger.at < page.view.ring.latest")
+    held = page.evaluate("document.getElementById('trigger-state').textContent")
+    assert re.search(r" at \d\d:\d\d:\d\d\.\d{3} \+0530, tick", held)
+    assert page.evaluate(
+        "/^..:..:.. .0530$/.test(document.querySelector('#events .fault').previousSibling.textContent)"
+    )
     page.wait_for("document.getElementById('form-note').textContent === 'In force.'")
     apply(page, "safety.max_speed_m_per_s", "")
     page.wait_for("document.getElementById('form-note').textContent === 'In force.'")

@@ -1,5 +1,7 @@
 // The last events, newest first, below what stands and should be known.
 
+import { clock } from "./clock.js";
+
 const MOST = 100;
 
 export class EventList {
@@ -10,7 +12,7 @@ export class EventList {
   draw(events, status) {
     const standing = (status?.warnings ?? []).map((text) => item("now", text, "standing"));
     const latest = events.slice(-MOST).reverse().map(({ timestamp, code, text }) => item(
-      new Date(timestamp * 1000).toTimeString().slice(0, 8), text, code >= 200 && code < 300 ? "fault" : ""));
+      clock(timestamp), text, code >= 200 && code < 300 ? "fault" : ""));
     this.list.replaceChildren(...standing, ...latest);
   }
 }

@@ -1,5 +1,7 @@
 // What has to be readable from two metres: state, law, rate, lateness; and the banners below.
 
+import { clock } from "./clock.js";
+
 const FAULTS = {
   200: "The law failed", 201: "The law took too long", 202: "Over-speed", 203: "Impossible sample", 204: "Device lost",
   205: "Device frozen", 206: "Device fault", 207: "Supervisor stalled", 208: "Control process lost", 209: "Loop too late",
@@ -53,8 +55,8 @@ function state(link, trouble, status) {
 function faultText(status) {
   if (!status.latched && !status.device_lost_timestamp) return "";
   const name = FAULTS[status.fault_code] ?? `Fault ${status.fault_code}`;
-  const when = status.fault_timestamp ? new Date(status.fault_timestamp * 1000).toTimeString().slice(0, 8) : "";
-  return `${name}${when ? ` at ${when}` : ""}. ${status.fault_text}`;
+  const at = status.fault_timestamp;
+  return `${name}${at ? ` at ${clock(at)}` : ""}. ${status.fault_text}`;
 }
 
 function percent(value) {

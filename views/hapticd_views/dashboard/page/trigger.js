@@ -1,5 +1,7 @@
 // As on an oscilloscope: wait for something to happen, then hold what was before it and what came after.
 
+import { clock } from "./clock.js";
+
 export const KINDS = [["off", "Live"], ["contact", "Contact"], ["cycle", "Cycle"], ["fault", "Fault"], ["late", "Late tick"]];
 
 export class Trigger {
@@ -52,9 +54,7 @@ export class Trigger {
     const name = KINDS.find(([kind]) => kind === this.kind)[1];
     if (this.state === "off") return "";
     if (this.state === "waiting") return `Waiting for: ${name.toLowerCase()}`;
-    const when = new Date(this.at * 1000);
-    const clock = `${when.toTimeString().slice(0, 8)}.${String(when.getMilliseconds()).padStart(3, "0")}`;
-    return `${name} at ${clock}, tick ${this.seq}${this.state === "filling" ? ": recording what follows" : ""}`;
+    return `${name} at ${clock(this.at, true)}, tick ${this.seq}${this.state === "filling" ? ": recording what follows" : ""}`;
   }
 
   #fire(at, seq) {
