@@ -192,7 +192,10 @@ def locate(name: str, instance: str = DEFAULT_INSTANCE) -> Path:
             closed = directory
     if given is not None:
         if closed is not None:
-            raise InstanceError(f"{closed}: not open to you, and it is the one that $HAPTICD_RUNTIME_DIR names")
+            raise InstanceError(
+                f"{closed}: not open to you, and it is the one that $HAPTICD_RUNTIME_DIR names: "
+                "unset that, or run as the user that owns the directory"
+            )
         return given / name
     if len(living) > 1:
         raise InstanceError(

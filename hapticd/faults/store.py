@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
+from functools import partial
 from pathlib import Path
 
 from hapticd.errors import HapticdError
@@ -57,7 +58,8 @@ class FaultStore:
         path = self.directory / f"{stamp}.{milliseconds % 1000:03d}Z-{code}{SUFFIX}"
         unfinished = path.with_suffix(_UNFINISHED)
         try:
-            with unfinished.open("wb") as file:
+            # Under any umask: it holds the configuration and what people did with the device.
+            with open(unfinished, "wb", opener=partial(os.open, mode=0o640)) as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())

@@ -6,6 +6,7 @@ what happened, and hears how it went.
 
 from __future__ import annotations
 
+import errno
 import os
 import threading
 import time
@@ -26,6 +27,18 @@ AFTER_S = 1.0
 
 _PIECE = 256
 """Rows that are copied at once."""
+
+_OPEN = "let the daemon's user write there, or set HAPTICD_STATE_DIR to a directory where it may"
+_ROOM = "make room there; the next fault is recorded again"
+_OTHER = "`hapticd doctor` says what is wrong with the directory"
+_REMEDIES = {
+    errno.EACCES: _OPEN,
+    errno.EPERM: _OPEN,
+    errno.EROFS: _OPEN,
+    errno.ENOSPC: _ROOM,
+    errno.EDQUOT: _ROOM,
+    errno.EMFILE: "raise the limit of open files (ulimit -n, LimitNOFILE=) and start the daemon again",
+}
 
 _MOST_WAITING = 4
 _PATIENCE_S = 1.0
@@ -64,7 +77,7 @@ class FaultRecorder:
             try:
                 self._waiting.append(_Job(self._store, event, epoch_s, shared, rate_hz, header))
             except OSError as error:  # no more files or memory to be had: no reason to end
-                self._problem = f"fault record not written: {error.strerror}"
+                self._problem = f"fault record not written: {_why(error)}"
 
     def turn(self, keep: int) -> str:
         """Start what is due; returns at once. What went wrong with a record that is done, "" when nothing did.
@@ -145,9 +158,9 @@ class _Job(threading.Thread):
             content = encode(self._header | {"trace": lines(self._trace)}, self._shared.layout, self._rows())
             self._store.write(self._epoch_s, self._event.code, content, self.keep)
         except OSError as error:
-            self.problem = f"fault record not written: {error.filename or self._store.directory}: {error.strerror}"
+            self.problem = f"fault record not written: {error.filename or self._store.directory}: {_why(error)}"
         except Exception as error:  # noqa: BLE001 - whatever it is, the supervisor goes on and says so
-            self.problem = f"fault record not written: {type(error).__name__}: {error}"
+            self.problem = f"fault record not written: {type(error).__name__}: {error}; please report it"
         finally:
             self._shared.close()
 
@@ -165,6 +178,11 @@ class _Job(threading.Thread):
             lost = max(0, self._shared.words[RECORDS] - slots + 2 - number)
             yield piece[min(lost, count) * size :]
             number += count
+
+
+def _why(error: OSError) -> str:
+    """The system's reason, and what to do."""
+    return f"{error.strerror}; {_REMEDIES.get(error.errno or 0, _OTHER)}"
 
 
 def _number(shared: SharedMemory, seq: int) -> int:

@@ -7,6 +7,7 @@ import errno
 import io
 import json
 import os
+import stat
 import time
 from contextlib import closing
 from pathlib import Path
@@ -227,8 +228,37 @@ def test_a_record_that_cannot_be_written_is_a_line_that_says_why(tmp_path: Path)
     shared.close()
     problem = recorder.close(5, 10.0)
     assert str(tmp_path / "state") in problem
+    assert problem.endswith("; `hapticd doctor` says what is wrong with the directory")
     assert "\n" not in problem
     assert recorder.written == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "remedy"), [(errno.EACCES, "let the daemon's user write there"), (errno.ENOSPC, "make room there")]
+)
+def test_a_record_that_cannot_be_written_says_what_to_do(
+    number: int, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    recorder = FaultRecorder(tmp_path)
+    with closing(SharedMemory(LAYOUT, RATE_HZ)) as shared:
+        recorder.begin(EVENT, 1e9, shared, RATE_HZ, header())
+        assert recorder.close(5, 10.0).startswith(
+            f"fault record not written: {tmp_path}: {os.strerror(number)}; {remedy}"
+        )
+
+
+@pytest.mark.parametrize(("umask", "mode"), [(0o000, 0o640), (0o022, 0o640), (0o077, 0o600)])
+def test_under_any_umask_a_record_is_for_its_owner_and_its_group_to_read(umask: int, mode: int, tmp_path: Path) -> None:
+    before = os.umask(umask)
+    try:
+        written = FaultStore(tmp_path / "faults").write(1e9, 203, b"record", 5)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(written.stat().st_mode) == mode
 
 
 def test_a_record_for_which_there_is_no_descriptor_left_does_not_end_the_daemon(
@@ -242,7 +272,7 @@ def test_a_record_for_which_there_is_no_descriptor_left_does_not_end_the_daemon(
     with closing(SharedMemory(LAYOUT, RATE_HZ)) as shared:
         monkeypatch.setattr(os, "dup", refuse)
         recorder.begin(EVENT, 1e9, shared, RATE_HZ, header())
-    assert recorder.turn(keep=2) == "fault record not written: Too many open files"
+    assert "Too many open files; raise the limit of open files (ulimit -n" in recorder.turn(keep=2)
     assert recorder.turn(keep=2) == ""
 
 
