@@ -38,7 +38,7 @@ class CommandHandler:
                 log.info("%s: asked by %s", request["do"], who)
             match request["do"]:
                 case "status":
-                    reply(True, status=state.status.made.as_map(), clock_ns=time.monotonic_ns())
+                    reply(True, status=self._status(), clock_ns=time.monotonic_ns())
                 case "receipt":
                     reply(True, receipt=self._receipt())
                 case "mark":
@@ -71,11 +71,14 @@ class CommandHandler:
         state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
         answer("")
 
+    def _status(self) -> dict[str, Any]:
+        return self._state.publisher.completed(self._state.status.made.as_map())
+
     def _receipt(self) -> dict[str, Any]:
         """What a recording of this daemon says of itself: status, the whole configuration, the computer."""
         state = self._state
         return {
-            **state.status.made.as_map(),
+            **self._status(),
             "config_hash": state.config.hash,
             "config_text": state.config.text,
             "device_info": asdict(state.loop.info),

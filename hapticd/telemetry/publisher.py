@@ -199,6 +199,11 @@ class Publisher:
         self._status = dict(status)
         self._send_status()
 
+    def completed(self, status: Mapping[str, Any]) -> Map:
+        """The state of the daemon with what only this knows: the time, the last tick, and one in how many there is."""
+        now = timestamp_s(time.monotonic_ns(), self._offset_ns)
+        return wire.status_map(status, now, self._seq, self._every_ticks)
+
     def flush(self, now_ns: int) -> None:
         """Send the ticks that wait, when the oldest has waited 20 ms.
 
@@ -300,8 +305,7 @@ class Publisher:
 
     def _send_status(self) -> None:
         assert self._status is not None
-        now = timestamp_s(time.monotonic_ns(), self._offset_ns)
-        self._send(Topic.STATUS, [wire.status_map(self._status, now, self._seq, self._every_ticks)])
+        self._send(Topic.STATUS, [self.completed(self._status)])
 
     def _send(self, topic: Topic, maps: list[Map]) -> None:
         self.counts.invalid += sum(INVALID in fields for fields in maps)

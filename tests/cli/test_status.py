@@ -15,6 +15,7 @@ from pathlib import Path
 import msgpack
 import zmq
 
+from hapticd.client.commands import command
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, wait_until
 
 
@@ -33,7 +34,7 @@ def locked(directory: Path) -> Iterator[None]:
 
 def test_every_daemon_that_lives_is_shown_and_what_a_killed_one_left_is_not(tmp_path: Path) -> None:
     began_s = time.time()
-    with Daemon("").wait_ready() as daemon:
+    with Daemon("[telemetry]\nevery_ticks = 5\n").wait_ready() as daemon:
         runtime = daemon.directory / "run"
         (runtime / "killed").mkdir()
         (runtime / "killed" / "lock").write_text("4711\n")
@@ -51,6 +52,10 @@ def test_every_daemon_that_lives_is_shown_and_what_a_killed_one_left_is_not(tmp_
                 assert (one["status"]["law"], other["status"]["law"]) == ("ring-damping", "tdpa")
                 assert began_s - 1.0 < one["status"]["started_timestamp"] < time.time()
                 assert 0.0 <= one["late_share"] <= 1.0
+                said = [one["status"], command("receipt", connect=f"ipc://{runtime}/default/control")["receipt"]]
+                for each in said:  # as telemetry has it
+                    assert began_s - 1.0 < each["timestamp"] < time.time() + 1.0
+                    assert (each["every_ticks"], each["seq"] > 0) == (5, True)
                 plain = status(runtime)
                 assert plain.returncode == 0
                 assert plain.stdout.startswith("default: armed, law ring-damping, ")
