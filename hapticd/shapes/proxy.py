@@ -14,19 +14,17 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any
 
-from hapticd.shapes.surface import SURFACE_M, ahead, buried, distance, land, passed, trace
+from hapticd.shapes.surface import SURFACE_M, distance, land, land_in_union, land_on_crease, trace
 
-_LEAST_M2 = 1e-16
+_LEAST_M2 = 1e-16  # two places that are less than 10 nm apart are one
 _SLIDES = 10
 _LEAST_SHARE = 0.01
-_CREASE = 0.02
-_ONE_FACE = 0.98
-_GONE = 0.5  # a step that is held before it is half done has not passed anything
-_THIN_M2 = 4e-8  # what stands on a face and is thinner than 0.2 mm may be passed
+_CREASE = 0.02  # squared sine of 8 degrees: two faces that meet at less have no crease
+_ONE_FACE = 0.98  # cosine of 11 degrees: two normals that differ by less are of one face
 _LANDINGS = 3
 _WAY_OUT = 100
 _CONE = 1.02
-_SAME_SIDE = 0.9
+_SAME_SIDE = 0.9  # cosine of 26 degrees
 
 
 def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> bool:
@@ -48,6 +46,7 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
     ny = proxy.uy
     nz = proxy.uz
     for _ in range(_SLIDES):
+        # a step along the face or the crease, and where it ends
         if crease:
             along = share * (wx * ex + wy * ey + wz * ez)
             tx = along * ex
@@ -60,72 +59,22 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             tz = share * (wz - along * nz)
         if tx * tx + ty * ty + tz * tz < proxy.least_m2:
             break
-        d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
         wall = False
         if proxy.end_part > proxy.first_part:
-            vx = x - proxy.gx
-            vy = y - proxy.gy
-            vz = z - proxy.gz
-            if -SURFACE_M <= d <= SURFACE_M and buried(proxy, others, voxels, x, y, z, mx, my, mz):
-                wall = True  # between two shapes that are flush: what stands there is another face
-                e, ox, oy, oz = ahead(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, nx, ny, nz, inf)
-            elif vx * vx + vy * vy + vz * vz > _THIN_M2 and vx * tx + vy * ty + vz * tz > _GONE * (
-                tx * tx + ty * ty + tz * tz
-            ):
-                e, ox, oy, oz = passed(
-                    proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, nx, ny, nz, tx, ty, tz, vx, vy, vz
-                )
-                wall = e >= -SURFACE_M
-            if wall:
-                if e < -SURFACE_M:
-                    break
-                mx = ox
-                my = oy
-                mz = oz
-                x = proxy.gx - e * mx
-                y = proxy.gy - e * my
-                z = proxy.gz - e * mz
-                d = 1.0
+            wall, d, x, y, z, mx, my, mz = land_in_union(proxy, others, voxels, tx, ty, tz)
+            if d == inf:
+                break
+        else:
+            d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
+        turn = nx * mx + ny * my + nz * mz
+        if -_ONE_FACE < turn < _ONE_FACE:
+            d, x, y, z, mx, my, mz = land_on_crease(proxy, others, voxels, px, py, pz, wall, d, x, y, z, mx, my, mz)
+
+        # nearer: there it is
         vx = px - x
         vy = py - y
         vz = pz - z
-        vv = ww if wall else vx * vx + vy * vy + vz * vz
-        turn = nx * mx + ny * my + nz * mz
-        if -_ONE_FACE < turn < _ONE_FACE:  # another face: where both meet, if the device is behind both
-            a = wx * nx + wy * ny + wz * nz
-            b = vx * mx + vy * my + vz * mz
-            both = 1.0 - turn * turn
-            first = (turn * b - a) / both
-            second = (turn * a - b) / both
-            if wall and not first > 0.0:  # up on the other face
-                first = 0.0
-                second = -b
-            if (first > 0.0 or wall) and second > 0.0:
-                e, qx, qy, qz, ox, oy, oz = land(
-                    proxy,
-                    others,
-                    voxels,
-                    px + first * nx + second * mx,
-                    py + first * ny + second * my,
-                    pz + first * nz + second * mz,
-                )
-                tx = px - qx
-                ty = py - qy
-                tz = pz - qz
-                tt = tx * tx + ty * ty + tz * tz
-                if tt < vv and -SURFACE_M <= e <= SURFACE_M:
-                    d = e
-                    x = qx
-                    y = qy
-                    z = qz
-                    if not wall:  # else the normal may be that of what is hidden
-                        mx = ox
-                        my = oy
-                        mz = oz
-                    vx = tx
-                    vy = ty
-                    vz = tz
-                    vv = tt
+        vv = vx * vx + vy * vy + vz * vz
         if vv < ww and -SURFACE_M <= d <= SURFACE_M:
             gained = ww - vv
             proxy.gx = x
@@ -142,30 +91,33 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
                 break
             share = 1.0
             crease = False
+            continue
+
+        # over an edge: seen from this face it may be free
+        vx = x - proxy.gx
+        vy = y - proxy.gy
+        vz = z - proxy.gz
+        if wx * mx + wy * my + wz * mz >= 0.0 and vx * vx + vy * vy + vz * vz < _LEAST_M2:
+            proxy.ux = nx = mx
+            proxy.uy = ny = my
+            proxy.uz = nz = mz
+            break
+
+        # no nearer: along the crease with that face, else not as far
+        ex = ny * mz - nz * my
+        ey = nz * mx - nx * mz
+        ez = nx * my - ny * mx
+        ee = ex * ex + ey * ey + ez * ez
+        if ee > _CREASE and not crease:
+            ee = sqrt(ee)
+            ex /= ee
+            ey /= ee
+            ez /= ee
+            crease = True
         else:
-            if wx * mx + wy * my + wz * mz >= 0.0:
-                vx = x - proxy.gx
-                vy = y - proxy.gy
-                vz = z - proxy.gz
-                if vx * vx + vy * vy + vz * vz < _LEAST_M2:  # over an edge: seen from this face it may be free
-                    proxy.ux = nx = mx
-                    proxy.uy = ny = my
-                    proxy.uz = nz = mz
-                    break
-            ex = ny * mz - nz * my
-            ey = nz * mx - nx * mz
-            ez = nx * my - ny * mx
-            ee = ex * ex + ey * ey + ez * ez
-            if ee > _CREASE and not crease:
-                ee = sqrt(ee)
-                ex /= ee
-                ey /= ee
-                ez /= ee
-                crease = True
-            else:
-                share *= 0.25
-                if share < _LEAST_SHARE:
-                    break
+            share *= 0.25
+            if share < _LEAST_SHARE:
+                break
     read(proxy, wx, wy, wz, ww)
     facing: bool = wx * nx + wy * ny + wz * nz < 0.0
     return facing
@@ -215,26 +167,8 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
                 if proxy.rough:
                     rub(proxy, others, voxels, x, y, z)
                 return
-        if not slide(proxy, others, voxels, x, y, z):
-            hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, True)
-            if not hit:
-                d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
-                release(proxy, x, y, z, d)
-                return
-            before_m = proxy.depth_m
-            wx = proxy.gx
-            wy = proxy.gy
-            wz = proxy.gz
-            meet(proxy, others, voxels, gx, gy, gz)
-            slide(proxy, others, voxels, x, y, z)
-            if proxy.depth_m > before_m:
-                proxy.gx = wx
-                proxy.gy = wy
-                proxy.gz = wz
-                wx = x - wx
-                wy = y - wy
-                wz = z - wz
-                read(proxy, wx, wy, wz, wx * wx + wy * wy + wz * wz)
+        if not slide(proxy, others, voxels, x, y, z) and not hold_on(proxy, others, voxels, x, y, z):
+            return
     else:
         d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
         wx = x - proxy.gx
@@ -247,18 +181,49 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
             proxy.gz = z
             proxy.d = d
             return
-        hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, False)
-        if not hit:
-            release(proxy, x, y, z, d)
+        if not come_in(proxy, others, voxels, x, y, z, d):
             return
-        proxy.touching = True
-        meet(proxy, others, voxels, gx, gy, gz)
-        proxy.sx = proxy.gx
-        proxy.sy = proxy.gy
-        proxy.sz = proxy.gz
-        slide(proxy, others, voxels, x, y, z)
     if proxy.rough:
         rub(proxy, others, voxels, x, y, z)
+
+
+def hold_on(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> bool:
+    """Of a face that the device is in front of, go on to another one behind which it is; else let it go free."""
+    hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, True)
+    if not hit:
+        d, _, _, _ = distance(proxy, others, voxels, x, y, z)
+        release(proxy, x, y, z, d)
+        return False
+    before_m = proxy.depth_m
+    wx = proxy.gx
+    wy = proxy.gy
+    wz = proxy.gz
+    meet(proxy, others, voxels, gx, gy, gz)
+    slide(proxy, others, voxels, x, y, z)
+    if proxy.depth_m > before_m:
+        proxy.gx = wx
+        proxy.gy = wy
+        proxy.gz = wz
+        wx = x - wx
+        wy = y - wy
+        wz = z - wz
+        read(proxy, wx, wy, wz, wx * wx + wy * wy + wz * wz)
+    return True
+
+
+def come_in(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, d: float) -> bool:
+    """Stop a free device at the surface that its way meets; where it meets none it stays free, d [m] away."""
+    hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, False)
+    if not hit:
+        release(proxy, x, y, z, d)
+        return False
+    proxy.touching = True
+    meet(proxy, others, voxels, gx, gy, gz)
+    proxy.sx = proxy.gx
+    proxy.sy = proxy.gy
+    proxy.sz = proxy.gz
+    slide(proxy, others, voxels, x, y, z)
+    return True
 
 
 def place(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 from hapticd.shapes.distance import shape_distance
@@ -16,6 +16,8 @@ _AGAINST = -0.9
 _FACE = 0.98
 _BEHIND = 0.04  # a landing 11 degrees behind a shape's face is not on its near side, round as it may be
 _LANDINGS = 4
+_GONE = 0.5  # a step that is held before it is half done has not passed anything
+_THIN_M2 = 4e-8  # what stands on a face and is thinner than 0.2 mm may be passed
 
 
 def distance(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> tuple[float, float, float, float]:
@@ -71,6 +73,122 @@ def land(
         y -= d * ny
         z -= d * nz
     return d, x, y, z, nx, ny, nz
+
+
+def land_in_union(
+    proxy: Any, others: Any, voxels: Any, tx: float, ty: float, tz: float
+) -> tuple[bool, float, float, float, float, float, float, float]:
+    """Where a step of the goal ends among several shapes: on their surface, or before a face that stands in the way.
+
+    Args:
+        proxy: the proxy.
+        others: the other shapes of its solid.
+        voxels: the distances of its fields.
+        tx: the step, with ty and tz, not 0 [m].
+        ty: see tx.
+        tz: see tx.
+
+    Returns:
+        Whether a face stands in the way; distance left, point and normal as of `land`, of that face the foot of the
+        goal on it and a distance that is off the surface. An endless distance: it has ended out of sight of any face.
+    """
+    gx = proxy.gx
+    gy = proxy.gy
+    gz = proxy.gz
+    d, x, y, z, mx, my, mz = land(proxy, others, voxels, gx + tx, gy + ty, gz + tz)
+    if -SURFACE_M <= d <= SURFACE_M and buried(proxy, others, voxels, x, y, z, mx, my, mz):
+        # between two shapes that are flush: what stands there is another face
+        e, ox, oy, oz = ahead(proxy, others, voxels, gx, gy, gz, proxy.ux, proxy.uy, proxy.uz, inf)
+        if e < -SURFACE_M:
+            return False, inf, x, y, z, mx, my, mz
+    else:
+        vx = x - gx
+        vy = y - gy
+        vz = z - gz
+        if not (
+            vx * vx + vy * vy + vz * vz > _THIN_M2
+            and vx * tx + vy * ty + vz * tz > _GONE * (tx * tx + ty * ty + tz * tz)
+        ):
+            return False, d, x, y, z, mx, my, mz
+        e, ox, oy, oz = passed(proxy, others, voxels, tx, ty, tz, vx, vy, vz)
+        if e < -SURFACE_M:
+            return False, d, x, y, z, mx, my, mz
+    return True, 1.0, gx - e * ox, gy - e * oy, gz - e * oz, ox, oy, oz
+
+
+def land_on_crease(
+    proxy: Any,
+    others: Any,
+    voxels: Any,
+    px: float,
+    py: float,
+    pz: float,
+    wall: bool,
+    d: float,
+    x: float,
+    y: float,
+    z: float,
+    mx: float,
+    my: float,
+    mz: float,
+) -> tuple[float, float, float, float, float, float, float]:
+    """The nearest point to the device where the goal's face and another meet, if it is behind both and nearer there.
+
+    Args:
+        proxy: the proxy.
+        others: the other shapes of its solid.
+        voxels: the distances of its fields.
+        px: the device, with py and pz [m].
+        py: see px.
+        pz: see px.
+        wall: whether the other face stands in the way of the goal, which has not come to it.
+        d: how far off the surface the place on the other face is [m].
+        x: that place, with y and z [m].
+        y: see x.
+        z: see x.
+        mx: the normal there, with my and mz.
+        my: see mx.
+        mz: see mx.
+
+    Returns:
+        Distance left, point and normal as of `land`; else the place on the other face as it came.
+    """
+    nx = proxy.ux
+    ny = proxy.uy
+    nz = proxy.uz
+    wx = px - proxy.gx
+    wy = py - proxy.gy
+    wz = pz - proxy.gz
+    vx = px - x
+    vy = py - y
+    vz = pz - z
+    turn = nx * mx + ny * my + nz * mz
+    a = wx * nx + wy * ny + wz * nz  # the device off either face, < 0 behind it
+    b = vx * mx + vy * my + vz * mz
+    both = 1.0 - turn * turn
+    first = (turn * b - a) / both  # how far along either normal from the device to where the faces meet
+    second = (turn * a - b) / both
+    if wall and not first > 0.0:  # up on the other face
+        first = 0.0
+        second = -b
+    if (first > 0.0 or wall) and second > 0.0:
+        e, qx, qy, qz, ox, oy, oz = land(
+            proxy,
+            others,
+            voxels,
+            px + first * nx + second * mx,
+            py + first * ny + second * my,
+            pz + first * nz + second * mz,
+        )
+        most = wx * wx + wy * wy + wz * wz if wall else vx * vx + vy * vy + vz * vz
+        vx = px - qx
+        vy = py - qy
+        vz = pz - qz
+        if vx * vx + vy * vy + vz * vz < most and -SURFACE_M <= e <= SURFACE_M:
+            if wall:  # there the normal may be that of what is hidden
+                return e, qx, qy, qz, mx, my, mz
+            return e, qx, qy, qz, ox, oy, oz
+    return d, x, y, z, mx, my, mz
 
 
 def buried(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, nx: float, ny: float, nz: float) -> bool:
@@ -134,44 +252,30 @@ def ahead(
 
 
 def passed(
-    proxy: Any,
-    others: Any,
-    voxels: Any,
-    gx: float,
-    gy: float,
-    gz: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    tx: float,
-    ty: float,
-    tz: float,
-    x: float,
-    y: float,
-    z: float,
+    proxy: Any, others: Any, voxels: Any, tx: float, ty: float, tz: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """Of the shapes of a union, distance and normal of one that stands in the way of a step along a face.
+    """Of the shapes of a union, distance and normal of one that stands in the way of a step of the goal.
 
     Args:
-        proxy: the proxy.
+        proxy: the proxy; its goal is on a face.
         others: the other shapes of its solid.
         voxels: the distances of its fields.
-        gx: a point on the face, with gy and gz [m].
-        gy: see gx.
-        gz: see gx.
-        nx: the face's normal, with ny and nz.
-        ny: see nx.
-        nz: see nx.
-        tx: the step, with ty and tz, not 0 [m].
+        tx: the step along the face, with ty and tz, not 0 [m].
         ty: see tx.
         tz: see tx.
-        x: from the point to where it has landed on the surface, with y and z [m].
+        x: from the goal to where the step has landed on the surface, with y and z [m].
         y: see x.
         z: see x.
 
     Returns:
         Less than `-SURFACE_M` where none does, or the step has ended before it.
     """
+    nx = proxy.ux
+    ny = proxy.uy
+    nz = proxy.uz
+    gx = proxy.gx
+    gy = proxy.gy
+    gz = proxy.gz
     length = sqrt(tx * tx + ty * ty + tz * tz)
     tx /= length
     ty /= length
