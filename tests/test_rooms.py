@@ -26,9 +26,7 @@ PACKAGES = {
 SOURCES = {name: sorted(folder.rglob("*.py")) for name, folder in PACKAGES.items()}
 
 LONGEST_CHAIN = 12
-MOST_LINES = (
-    35_600  # raised on purpose only, with what is new: who may change a key, and what to do about a fault record
-)
+MOST_LINES = 35_610  # raised on purpose only: objects are made ready by themselves
 MOST_LINES_OF_A_MODULE = 400
 LARGEST_ROOM = 0.19  # tick: couplings, forces and remote objects are contacts, and need what contacts are made of
 

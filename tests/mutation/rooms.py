@@ -72,7 +72,7 @@ ROOMS = {
     "space": Room(
         (
             *(f"hapticd/tick/space/{name}.py" for name in ("books", "channel", "crease")),
-            *(f"hapticd/tick/space/{name}.py" for name in ("solid", "solid_contact", "tick")),
+            *(f"hapticd/tick/space/{name}.py" for name in ("solid", "solid_contact", "switch", "tick")),
         ),
         (
             "tests/tick/space", "tests/shapes/test_solid.py", "tests/shapes/test_friction.py",

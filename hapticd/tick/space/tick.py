@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterable
+from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from hapticd.config.models import SceneConfig, VelocityConfig
@@ -18,9 +19,9 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Guard, Mode
 from hapticd.tick.remote.tick_ports import MakePort
 from hapticd.tick.space.books import SpaceBooks, Totals
-from hapticd.tick.space.channel import Channel
 from hapticd.tick.space.solid import Solid, at_once, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
+from hapticd.tick.space.switch import SpaceSwitch
 from hapticd.tick.switch import no_law
 from hapticd.tick.tick import ControlTick
 
@@ -110,75 +111,25 @@ class SpaceTick(ControlTick):
             PluginError: the law cannot start; nothing has changed then.
         """
         make = self.make_law if make_law is None else make_law
-        there = self.solids
         limits = {} if scene is None else _object_limits(scene)
-        changed: list[tuple[SolidContact, Solid, list[Channel]]] = []
-        fading: list[tuple[SolidContact, list[tuple[Contact, RunningLaw]]]] = []
-        new: list[SolidContact] = []
-        kept: list[tuple[SolidContact, Solid]] = []
+        switch = SpaceSwitch(self.solids)
         if scene is not None:
-            solids = yield from compile_objects(scene.objects, self.period_s)
-            known = {(contact.solid.name, contact.moves): contact for contact in self.solids}
-            there = []
-            for solid in solids:
-                contact = known.pop((solid.name, solid.remote), None)
-                if contact is None:
-                    contact = self._contact(solid, make, limits)
-                    new.append(contact)
-                elif not solid.same_as(contact.solid):
-                    changed.append((contact, solid, contact.rougher(solid, make)))
-                else:
-                    kept.append((contact, solid))
-                there.append(contact)
-                yield
-            fading = [(contact, _still(contact.channels)) for contact in known.values()]
-        laws: list[tuple[Contact, RunningLaw]] = []
-        for contact in there:
-            if make_law is not None and contact not in new:
-                laws += [(channel, make()) for channel in contact.channels]
-                yield
-        fresh = [channel for contact in new for channel in contact.channels]
-        fresh += [channel for _, _, channels in changed for channel in channels]
-        laws += [(channel, channel.law) for channel in fresh]
+            contact_of = partial(self._contact, make_law=make, limits=limits)
+            yield from switch.to_scene(scene.objects, self.period_s, contact_of, make)
+        if make_law is not None:
+            yield from switch.to_law(make_law)
 
         def start() -> None:
-            for contact in new:
+            for contact in switch.new:
                 contact.start(*self.at_m)
-            self._start_laws(laws)
+            self._start_laws(switch.laws)
 
         yield from self._switch(scene, safety, make_law, start)
-        # From here on nothing can fail.
-        limit_n = self.guard.limit_n
-        before = _places(self.solids)
-        for contact, solid in kept:
-            contact.solid.index, contact.solid.members = solid.index, solid.members
-        for contact, still in fading:
-            contact.let_go(limit_n)
-            self.fading.append(contact)
-            for channel, law in still:
-                self._take_law(channel, law)
-        blending: list[Channel] = []
-        for contact, solid, channels in changed:
-            if any(channel.applied_n != 0.0 for channel in contact.channels):
-                self._fade(contact)
-            contact.change(solid, channels, limit_n, self.at_m)
-            blending += contact.channels
-        self.solids = there
-        self.listing += _places(there) != before
+        self._take_objects(switch)
         if scene is not None:
             self.objects = len(scene.objects)
-            for each in self._moving():
-                each.join()
-                each.ramp_s = self.ramp_s
-                each.port.change(limits[each.port.name])
-        if self.fallback:
-            laws = self._start_laws([(channel, self._fallback_law()) for channel in fresh])
-        for channel, law in laws:
-            self._take_law(channel, law)
-        if self.guard.limited:
-            blending = [channel for contact in (*self.solids, *self.fading) for channel in contact.channels]
-        for one in blending:
-            self._blend(one)
+            self._join(limits)
+        self._take_object_laws(switch)
         self._take_solids()
 
     def totals(self) -> Totals:
@@ -319,6 +270,45 @@ class SpaceTick(ControlTick):
             return self._make_remote(solid, make_law, self.info.resolution_m, limits[solid.name], self.ramp_s)
         return SolidContact(solid, make_law, self.info.resolution_m)
 
+    def _take_objects(self, switch: SpaceSwitch) -> None:
+        """Go on with the objects that have been made ready; nothing can fail from here on."""
+        limit_n = self.guard.limit_n
+        before = _places(self.solids)
+        for contact, solid in switch.kept:
+            contact.solid.index, contact.solid.members = solid.index, solid.members
+        for contact, still in switch.gone:
+            contact.let_go(limit_n)
+            self.fading.append(contact)
+            for channel, law in still:
+                self._take_law(channel, law)
+        for contact, solid, channels in switch.changed:
+            if any(channel.applied_n != 0.0 for channel in contact.channels):
+                self._fade(contact)
+            contact.change(solid, channels, limit_n, self.at_m)
+        self.solids = switch.solids
+        self.listing += _places(self.solids) != before
+
+    def _take_object_laws(self, switch: SpaceSwitch) -> None:
+        """Put on the laws that have been started, and let come in by a ramp what is another than it was."""
+        laws = switch.laws
+        if self.fallback:
+            laws = self._start_laws([(channel, self._fallback_law()) for channel in switch.fresh])
+        for channel, law in laws:
+            self._take_law(channel, law)
+        blending = [contact for contact, _, _ in switch.changed]
+        if self.guard.limited:  # who goes on would take a larger share of the limit at once
+            blending = [*self.solids, *self.fading]
+        for contact in blending:
+            for channel in contact.channels:
+                self._blend(channel)
+
+    def _join(self, limits: Limits) -> None:
+        """Have clients move the objects that are theirs, within the limits that the scene sets them."""
+        for each in self._moving():
+            each.join()
+            each.ramp_s = self.ramp_s
+            each.port.change(limits[each.port.name])
+
     def _moving(self) -> list[RemoteContact]:
         return [cast("RemoteContact", contact) for contact in self.solids if contact.moves]
 
@@ -374,7 +364,3 @@ def _object_limits(scene: SceneConfig) -> Limits:
 def _places(solids: Iterable[SolidContact]) -> list[tuple[object, ...]]:
     """Who stands where in the list of objects."""
     return [(contact.solid.name, contact.moves, contact.solid.members) for contact in solids]
-
-
-def _still(channels: Iterable[Contact]) -> list[tuple[Contact, RunningLaw]]:
-    return [(channel, no_law()) for channel in channels]
