@@ -168,12 +168,13 @@ def by_the_kernel(
 
     kernel = make({**batch.switches, **(switches or {})}, step)
     law_state = _fields(case.law)
-    plant, loop, tick, wall, ledger = objects.plant, objects.loop, objects.tick, objects.wall, objects.ledger
-    dt_s, limit_n = objects.params.dt_s, objects.params.limit_n
+    plant, tick, wall, ledger = objects.device.state, objects.law.tick, objects.wall, objects.ledger
+    loop, params = objects.control.state, objects.control.params
+    dt_s, limit_n = params.dt_s, params.limit_n
     run = Run()
     for at in range(case.ticks if case.stepwise else 1):
         if case.stepwise:
-            objects.params.first_segment, objects.params.end_segment = at, at + 1
+            params.first_segment, params.end_segment = at, at + 1
         kernel(*objects)
         if not loop.finite:
             break
@@ -186,7 +187,7 @@ def by_the_kernel(
                 *_tick(tick),
                 *_wall(wall),
                 *_ledger(ledger),
-                *law_state(objects.law_state),
+                *law_state(objects.law.state),
                 x_m,
                 velocity,
                 dt_s,

@@ -16,7 +16,7 @@ from hapticd.simulation.batch.machine_code import machine_code
 from hapticd.simulation.batch.point import Point
 from hapticd.simulation.batch.prepare import Prepared
 from hapticd.simulation.batch.result import BatchResult, result_of
-from hapticd.simulation.batch.state import LoopBuffers
+from hapticd.simulation.batch.state import LoopBuffers, LoopControl, LoopDevice, LoopLaw
 from hapticd.simulation.compiler.threads import in_threads
 from hapticd.simulation.plant import Buffers, terms
 from hapticd.tick.energy import EnergyLedger
@@ -25,16 +25,9 @@ from hapticd.tick.energy import EnergyLedger
 class PlainLoop(NamedTuple):
     """What `run` takes, as plain objects."""
 
-    plant: Any
-    plant_epochs: Any
-    buffers: Buffers
-    history: LoopBuffers
-    loop: Any
-    params: Any
-    segments: Any
-    law_state: Any
-    law_params: Any
-    tick: Any
+    device: LoopDevice
+    control: LoopControl
+    law: LoopLaw
     wall: Any
     ledger: EnergyLedger
     trace: Any
@@ -48,16 +41,18 @@ def plain_loop(prepared: Prepared, trace: Any) -> PlainLoop:
         trace: where its trace goes, (rows, columns).
     """
     return PlainLoop(
-        plain(prepared.plant),
-        [plain(fields) for fields in prepared.epochs],
-        Buffers(list(prepared.line), *prepared.recorded),
-        LoopBuffers(list(prepared.history), [0.0] * len(prepared.history)),
-        plain(prepared.loop),
-        plain({**prepared.params, "first_segment": 0, "end_segment": len(prepared.segments)}),
-        [plain(fields) for fields in prepared.segments],
-        plain(prepared.law_state),
-        plain(prepared.law_params),
-        plain(prepared.tick),
+        LoopDevice(
+            plain(prepared.plant),
+            [plain(fields) for fields in prepared.epochs],
+            Buffers(list(prepared.line), *prepared.recorded),
+        ),
+        LoopControl(
+            plain(prepared.loop),
+            plain({**prepared.params, "first_segment": 0, "end_segment": len(prepared.segments)}),
+            [plain(fields) for fields in prepared.segments],
+            LoopBuffers(list(prepared.history), [0.0] * len(prepared.history)),
+        ),
+        LoopLaw(plain(prepared.law_state), plain(prepared.law_params), plain(prepared.tick)),
         plain(prepared.wall),
         EnergyLedger(),
         trace,
@@ -154,7 +149,7 @@ class Batch:
         for at, one in enumerate(self.prepared):
             objects = plain_loop(one, arrays.traces[at])
             loop(*objects)
-            store(arrays.loops[at], objects.loop)
+            store(arrays.loops[at], objects.control.state)
             store(arrays.ledgers[at], objects.ledger)
-            store(arrays.law_states[at], objects.law_state)
+            store(arrays.law_states[at], objects.law.state)
         return result_of(self.prepared, arrays)

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from hapticd.simulation.batch.state import LoopControl, LoopDevice, LoopLaw
 from hapticd.simulation.compiler.specialise import specialise
 from hapticd.simulation.options import FARTHEST_M
 from hapticd.simulation.plant import move, sense
@@ -44,22 +45,20 @@ def law_step(state: Any, params: Any, tick: Any) -> float:
     raise NotImplementedError
 
 
-def run(
-    plant: Any,
-    plant_epochs: Any,
-    buffers: Any,
-    history: Any,
-    loop: Any,
-    params: Any,
-    segments: Any,
-    law_state: Any,
-    law_params: Any,
-    tick: Any,
-    wall: Any,
-    ledger: Any,
-    trace: Any,
-) -> None:
-    """One loop from its first tick to its last."""
+def run(device: LoopDevice, control: LoopControl, law: LoopLaw, wall: Any, ledger: Any, trace: Any) -> None:
+    """One loop from its first tick to its last.
+
+    Args:
+        device: where it starts, and where it is at the end.
+        control: the same of the loop.
+        law: the same of the law.
+        wall: fields of `WallState`.
+        ledger: fields of `EnergyLedger`.
+        trace: room for `TRACE_COLUMNS`, (rows, columns).
+    """
+    plant, plant_epochs, buffers = device
+    loop, params, segments, history = control
+    law_state, law_params, tick = law
     for at in range(params.first_segment, params.end_segment):
         segment = segments[at]
         plant_params = plant_epochs[segment.epoch]

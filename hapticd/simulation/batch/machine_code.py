@@ -9,7 +9,7 @@ from typing import Any
 from numba import njit
 
 from hapticd.simulation.batch.kernel import bound
-from hapticd.simulation.batch.state import LoopBuffers
+from hapticd.simulation.batch.state import LoopBuffers, LoopControl, LoopDevice, LoopLaw
 from hapticd.simulation.compiler.compile import INNER, OPTIONS, compiled, compiled_step, on_stack
 from hapticd.simulation.plant import Buffers
 
@@ -35,17 +35,12 @@ def machine_code(law: ModuleType, switches: tuple[tuple[str, bool], ...]) -> Any
         line = slice(arrays.line_from[at], arrays.line_from[at + 1])
         points = slice(arrays.points_from[at], arrays.points_from[at + 1])
         past = slice(arrays.history_from[at], arrays.history_from[at + 1])
+        buffers = Buffers(arrays.lines[line], arrays.points_s[points], arrays.points_n[points])
+        history = LoopBuffers(arrays.history_m[past], arrays.history_s[past])
         loop(
-            plant,
-            arrays.epochs,
-            Buffers(arrays.lines[line], arrays.points_s[points], arrays.points_n[points]),
-            LoopBuffers(arrays.history_m[past], arrays.history_s[past]),
-            state,
-            on_stack(arrays.params[at]),
-            arrays.segments,
-            law_state,
-            on_stack(arrays.law_params[at]),
-            tick,
+            LoopDevice(plant, arrays.epochs, buffers),
+            LoopControl(state, on_stack(arrays.params[at]), arrays.segments, history),
+            LoopLaw(law_state, on_stack(arrays.law_params[at]), tick),
             wall,
             ledger,
             arrays.traces[at],

@@ -12,7 +12,13 @@ from typing import Any
 import numpy as np
 
 from hapticd.shapes.solid import Part
-from hapticd.simulation.batch.space_kernel import TRACE_COLUMNS, SpaceLoop
+from hapticd.simulation.batch.space_kernel import (
+    TRACE_COLUMNS,
+    SpaceContacts,
+    SpaceDevice,
+    SpaceLoop,
+    SpaceVectors,
+)
 from hapticd.simulation.batch.space_machine import machine_of
 from hapticd.simulation.compiler.classes import fill, store
 from hapticd.simulation.plant import Buffers, terms
@@ -121,15 +127,19 @@ class SpaceRun:
         return [
             self._record(self._loop, several),
             self._record(tick.guard, several),
-            contacts,
-            _rows(dtype, [axis.state for axis in axes]),
-            _rows(dtype, [axis.params for axis in axes]),
-            tuple(Buffers(*(np.array(values, float) for values in axis.buffers)) for axis in axes),
-            np.array(matrices.table if matrices else (0.0,)),
-            np.array(matrices.springs_n_per_m if matrices else (0.0,) * 3),
-            np.array([contact in tick.awake for contact in solids]),
-            np.array([contact in tick.held for contact in solids]),
-            *(np.array(values, float) for values in self._vectors()),
+            SpaceDevice(
+                _rows(dtype, [axis.state for axis in axes]),
+                _rows(dtype, [axis.params for axis in axes]),
+                tuple(Buffers(*(np.array(values, float) for values in axis.buffers)) for axis in axes),
+                np.array(matrices.table if matrices else (0.0,)),
+                np.array(matrices.springs_n_per_m if matrices else (0.0,) * 3),
+            ),
+            SpaceContacts(
+                contacts,
+                np.array([contact in tick.awake for contact in solids]),
+                np.array([contact in tick.held for contact in solids]),
+            ),
+            SpaceVectors(*(np.array(values, float) for values in self._vectors())),
             self.trace,
         ]
 
@@ -145,12 +155,12 @@ class SpaceRun:
     def _store(self) -> None:
         """Put what the kernel has left into the objects."""
         tick, device = self._tick, self._device
-        loop, guard, contacts, plants, _, buffers, _, _, awake, held, *vectors, _ = self._arguments
+        loop, guard, left, (contacts, awake, held), vectors, _ = self._arguments
         store(loop[0], self._loop)
         store(guard[0], tick.guard)
         for row, contact in zip(contacts, tick.solids, strict=True):
             store(row, contact)
-        for axis, row, line in zip(device.axes, plants, buffers, strict=True):
+        for axis, row, line in zip(device.axes, left.plants, left.buffers, strict=True):
             before = axis.state.tick
             store(row, axis.state)
             own = terms(axis.options)  # what the code can do beyond that leaves its traces

@@ -8,7 +8,7 @@ tests/simulation/test_space_batch.py holds every object that a run leaves agains
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from hapticd.shapes.reach import slack_m
 from hapticd.simulation.options import FARTHEST_M
@@ -65,26 +65,52 @@ class SpaceLoop:
     places_z: int
 
 
-def run(
-    loops: Any,
-    guards: Any,
-    contacts: Any,
-    plants: Any,
-    params: Any,
-    buffers: Any,
-    table: Any,
-    springs: Any,
-    awake: Any,
-    held: Any,
-    position_m: Any,
-    velocity_m_per_s: Any,
-    force_n: Any,
-    requested_n: Any,
-    trace: Any,
-) -> bool:
-    """A run from where it is to its last tick; False where it left all bounds, as the daemon would have stopped it."""
+class SpaceDevice(NamedTuple):
+    """The simulated device."""
+
+    plants: Any  # fields of `PlantState`, by axis
+    params: Any  # fields of `PlantParams`, by axis
+    buffers: Any  # `Buffers`, by axis
+    table: Any  # mass matrices of all places, where the axes share one
+    springs: Any  # stiffness of the hand, by axis, where the axes share a mass matrix [N/m]
+
+
+class SpaceContacts(NamedTuple):
+    """The solids and which of them the tick goes through."""
+
+    contacts: Any  # fields of `SolidContact`, by solid
+    awake: Any  # by solid whether the device may touch it
+    held: Any  # by solid whether a tick without news holds its force
+
+
+class SpaceVectors(NamedTuple):
+    """What the tick leaves to be seen, by axis."""
+
+    position_m: Any
+    velocity_m_per_s: Any
+    force_n: Any
+    requested_n: Any
+
+
+def run(loops: Any, guards: Any, device: SpaceDevice, solids: SpaceContacts, vectors: SpaceVectors, trace: Any) -> bool:
+    """A run from where it is to its last tick.
+
+    Args:
+        loops: the one `SpaceLoop`.
+        guards: the one guard.
+        device: where it is.
+        solids: the same of what it touches.
+        vectors: the same of what is seen of the tick.
+        trace: room for `TRACE_COLUMNS`, (ticks, columns).
+
+    Returns:
+        False where it left all bounds, as the daemon would have stopped it.
+    """
     loop = loops[0]
     guard = guards[0]
+    plants, params, buffers, table, springs = device
+    contacts, awake, held = solids
+    position_m, velocity_m_per_s, force_n, requested_n = vectors
     count = len(contacts)
     dt_s = loop.dt_s
     while loop.ticks < loop.stop:

@@ -14,6 +14,31 @@ class LoopBuffers(NamedTuple):
     time_s: Any
 
 
+class LoopDevice(NamedTuple):
+    """The simulated device of one loop."""
+
+    state: Any  # fields of `PlantState`
+    epochs: Any  # its coefficients, fields of `PlantParams` by epoch
+    buffers: Any  # its `Buffers`
+
+
+class LoopControl(NamedTuple):
+    """The loop itself."""
+
+    state: Any  # fields of `LoopState`
+    params: Any  # fields of `LoopParams`
+    segments: Any  # fields of `Segment`, one after the other
+    history: LoopBuffers
+
+
+class LoopLaw(NamedTuple):
+    """The law of the wall."""
+
+    state: Any
+    params: Any
+    tick: Any  # fields of `LawTick`, what it is shown
+
+
 class LoopState:
     """What the loop remembers, and what it reports at the end."""
 
