@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from hapticd.errors import ConfigError
 from hapticd_studies.grid.output import require_cluster, require_extra, require_folder, require_memory, write
+
+if TYPE_CHECKING:  # it needs the extra `study`
+    from hapticd_studies.robustness.report import RobustnessReport
 
 _FILES = ("robustness.csv", "robustness.json", "robustness.png")
 _MOST_DEVICES = 10_000_000
@@ -43,7 +46,7 @@ def command(
     require_extra("study", "numpy", "numba", "matplotlib")
     require_cluster(cluster)
     from hapticd_studies.law_spec import parse_laws
-    from hapticd_studies.robustness.readings import SHORT, every_reading, short
+    from hapticd_studies.robustness.readings import every_reading
 
     if only is not None:
         _replay(only, laws, output)
@@ -72,9 +75,18 @@ def command(
     if as_json:
         typer.echo((folder / "robustness.json").read_text(), nl=False)
         return
+    _show(found, folder / _FILES[1])
+    console = Console(highlight=False)
+    console.print(f"{plan.criterion.words()}", soft_wrap=True, markup=False)
+    console.print(f"{folder}: {', '.join(_FILES)}", soft_wrap=True, markup=False)
+
+
+def _show(found: RobustnessReport, file: Path) -> None:
+    from hapticd_studies.robustness.readings import SHORT, short
+
     console = Console(highlight=False)
     console.print(found.table())
-    used = [word for word in SHORT if any(word in short(reading.label)[1] for reading in readings)]
+    used = [word for word in SHORT if any(word in short(reading.label)[1] for reading in found.plan.readings)]
     console.print(*(f"{word}: {SHORT[word]}" for word in used), sep="; ", markup=False, soft_wrap=True)
     console.print()
     for name, group, least, holds in found.bars:
@@ -97,11 +109,9 @@ def command(
         beyond = len(found.failures) - len(near)
         console.print(
             f"{unlisted} more do not settle, {beyond} of them beyond the reach of damping; each with its reason and "
-            f"the command that replays it: {folder / _FILES[1]}, not_settled",
+            f"the command that replays it: {file}, not_settled",
             soft_wrap=True,
         )
-    console.print(f"{plan.criterion.words()}", soft_wrap=True, markup=False)
-    console.print(f"{folder}: {', '.join(_FILES)}", soft_wrap=True, markup=False)
 
 
 def _replay(only: str, laws: str, output: Path | None) -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from hapticd.errors import ConfigError
 from hapticd_studies.grid.output import require_cluster, require_extra, require_folder, require_memory, write
+
+if TYPE_CHECKING:  # they need the extra `study`
+    from hapticd_studies.law_spec import LawSpec
+    from hapticd_studies.transparency.report import TransparencyReport
 
 _FILES = ("transparency.csv", "transparency.json", "transparency.png")
 _MOST_DEVICES = 1_000_000
@@ -68,33 +73,19 @@ def command(
         laws = QUICK
     chosen = every_law() if laws == "all" else parse_laws(laws, {})
 
-    from hapticd.offline.outcome import Criterion
-
     if replay is not None:
-        from hapticd_studies.transparency.replay import device_of, figures, write_files
-
-        device = device_of(replay, out_of_sample)
-        if output is not None:
-            require_folder(output, ())
-        console = Console(highlight=False)
-        for name, value in device.figures().items():
-            console.print(f"{name} = {value}", markup=False)
-        console.print()
-        console.print(figures(device, chosen, seconds, Criterion()))
-        if output is not None:
-            drawn = parse_laws(QUICK, {}) if laws == "all" else chosen
-            for path in write_files(device, drawn, seconds, Criterion(), output):
-                console.print(str(path), soft_wrap=True, markup=False)
+        drawn = parse_laws(QUICK, {}) if laws == "all" else chosen
+        _replay(replay, out_of_sample, chosen, drawn, seconds, output)
         return
 
     require_memory(1000.0 * devices * (len(chosen) + 1) + 4e7 * seconds, f"--devices {devices}")
     folder = output or Path("transparency")
     require_folder(folder, _FILES)
 
+    from hapticd.offline.outcome import Criterion
     from hapticd_studies.grid.run import kept, run
-    from hapticd_studies.transparency.devices import OUT_OF_SAMPLE
     from hapticd_studies.transparency.plot import draw
-    from hapticd_studies.transparency.report import AT_REST_WORDS, MOVING_WORDS, report
+    from hapticd_studies.transparency.report import report
 
     plan = TransparencyPlan(seed, devices, seconds, chosen, Criterion(), out_of_sample)
     Console(stderr=True, highlight=False).print(
@@ -110,20 +101,53 @@ def command(
     if as_json:
         typer.echo((folder / "transparency.json").read_text(), nl=False)
         return
+    _show(found)
+    Console(highlight=False).print(f"{folder}: {', '.join(_FILES)}", soft_wrap=True, markup=False)
+
+
+def _show(found: TransparencyReport) -> None:
+    from hapticd_studies.transparency.devices import OUT_OF_SAMPLE
+    from hapticd_studies.transparency.report import AT_REST_WORDS, MOVING_WORDS
+
+    plan = found.plan
     console = Console(highlight=False)
     console.print(
-        f"{found.summaries['all'][0].devices} of {devices} devices are held by some constant damper; of them:"
+        f"{found.summaries['all'][0].devices} of {plan.count} devices are held by some constant damper; of them:"
     )
     for head, table, words in (
         ("Hands that come to stay", found.at_rest(), AT_REST_WORDS),
         ("Hands that move", found.moving(), MOVING_WORDS),
     ):
         console.print(f"\n[bold]{head}[/]", table, words, sep="\n")
-    if out_of_sample:
+    if plan.out_of_sample:
         console.print("\n[bold]By what they have[/]", found.parts(), f"Out of sample: {OUT_OF_SAMPLE}", sep="\n")
-    asked = " --out-of-sample" if out_of_sample else ""
+    asked = " --out-of-sample" if plan.out_of_sample else ""
     console.print(
-        f"\nOne again: hapticd study transparency{asked} --seconds {seconds:g} --replay {seed}:0", soft_wrap=True
+        f"\nOne again: hapticd study transparency{asked} --seconds {plan.duration_s:g} --replay {plan.seed}:0",
+        soft_wrap=True,
     )
     console.print(f"{plan.criterion.words()}", soft_wrap=True, markup=False)
-    console.print(f"{folder}: {', '.join(_FILES)}", soft_wrap=True, markup=False)
+
+
+def _replay(
+    text: str,
+    out_of_sample: bool,
+    laws: Sequence[LawSpec],
+    drawn: Sequence[LawSpec],
+    duration_s: float,
+    output: Path | None,
+) -> None:
+    from hapticd.offline.outcome import Criterion
+    from hapticd_studies.transparency.replay import device_of, figures, write_files
+
+    device = device_of(text, out_of_sample)
+    if output is not None:
+        require_folder(output, ())
+    console = Console(highlight=False)
+    for name, value in device.figures().items():
+        console.print(f"{name} = {value}", markup=False)
+    console.print()
+    console.print(figures(device, laws, duration_s, Criterion()))
+    if output is not None:
+        for path in write_files(device, drawn, duration_s, Criterion(), output):
+            console.print(str(path), soft_wrap=True, markup=False)
