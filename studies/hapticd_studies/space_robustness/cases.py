@@ -16,6 +16,7 @@ from hapticd.config.models import LoopConfig
 from hapticd.config.objects import OBJECT
 from hapticd.errors import ConfigError
 from hapticd.shapes.distance import shape_distance
+from hapticd.shapes.pose import Vector
 from hapticd.shapes.solid import Part
 from hapticd.simulation.space.linkage import mass_matrix
 from hapticd.tick.space.solid import placed
@@ -157,58 +158,31 @@ def draw(seed: int, index: int) -> Case:
     pace, radius_m = uniform(0.5, 1.5), logarithmic(5e-4, 4e-3)
     rubs = source.random() < 0.5
     turn = _turn(source)
-    at, normal, along = (np.array(each) for each in (touched.at_m, touched.normal, touched.along))
-
-    press = _list(-newton * normal)
-    force: dict[str, Any]
-    aim: dict[str, Any] = {"path": "hold", "at_m": _list(at)}
-    springs = [spring] * 3
-    match hand:
-        case "press":
-            force = {"profile": "press", "newton": _list(-newton * (normal + lean * along)), "duration_s": 0.2}
-        case "stroke":
-            force = {"profile": "stroke", "newton": press, "along_newton": _list(amplitude * along)}
-            force["frequency_hz"] = pace
-        case "tap":
-            force = {"profile": "tap", "newton": press, "period_s": digits(1.0 / pace)}
-            force["release_newton"] = _list(0.5 * normal)
-        case "circle":
-            force = {"profile": "constant", "newton": press}
-            aim = {"path": "circle", "centre_m": _list(at), "radius_m": radius_m, "frequency_hz": pace}
-        case _:
-            force = {"profile": "let-go", "newton": press, "at_s": LETS_GO_S}
+    force, aim = _moves(hand, touched, newton, lean, amplitude, pace, radius_m)
 
     resolution_m = logarithmic(1e-6, 3e-5)
+    at, normal = np.array(touched.at_m), np.array(touched.normal)
     while _shown_inside(objects, at + start_m * normal, resolution_m):  # by the sensor's steps: a step farther off
         start_m += resolution_m
-    space: dict[str, Any] = {"position_m": _list(at + start_m * normal)}
+    own, in_space, matrix = _inertia(coupling, masses, turn, coulomb_n if rubs else [], touched.at_m)
     options: dict[str, Any] = {
         "axes": 3,
         "resolution_m": resolution_m,
         "max_force_n": MAX_FORCE_N,
         "force_delay_samples": int(late),
-        "space": space,
-    }
-    if coupling < 0.4:
-        space["mass_kg"] = masses
-        matrix = np.diag(masses)
-        if rubs:
-            space["coulomb_n"] = coulomb_n
-    elif coupling < 0.8:
-        matrix = turn @ np.diag(masses) @ turn.T
-        matrix = 0.5 * (matrix + matrix.T)
-        space["mass_matrix_kg"] = matrix.tolist()
-    else:
-        options["mass_kg"] = masses[0]
-        space["linkage"] = "delta"
-        matrix = np.array(mass_matrix(masses[0], [0.0] * 3, *touched.at_m))
-    space["viscous_n_s_per_m"] = viscous
-    space["hand"] = {
-        "force": force,
-        "aim": aim,
-        "mass_kg": [hand_kg] * 3,
-        "damping_n_s_per_m": [damping] * 3,
-        "stiffness_n_per_m": springs,
+        "space": {
+            "position_m": _list(at + start_m * normal),
+            **in_space,
+            "viscous_n_s_per_m": viscous,
+            "hand": {
+                "force": force,
+                "aim": aim,
+                "mass_kg": [hand_kg] * 3,
+                "damping_n_s_per_m": [damping] * 3,
+                "stiffness_n_per_m": [spring] * 3,
+            },
+        },
+        **own,
     }
     rate_hz = logarithmic(500.0, 2000.0)
     lightest_kg = float(np.linalg.eigvalsh(matrix).min()) + hand_kg
@@ -225,6 +199,63 @@ def case_of(text: str) -> Case:
     if found is None:
         raise ConfigError(f"--only {text}: must be SEED:INDEX, as 1:75")
     return draw(int(found[1]), int(found[2]))
+
+
+def _moves(
+    hand: str, touched: Surface, newton: float, lean: float, amplitude: float, pace_hz: float, radius_m: float
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Force and aim of a hand, as the options of the device have them.
+
+    Args:
+        hand: what it does.
+        touched: the surface.
+        newton: how firmly it presses [N].
+        lean: how much of that a press leans along the surface.
+        amplitude: of the force along it that a stroke has [N].
+        pace_hz: of strokes, taps and circles [Hz].
+        radius_m: of a circle [m].
+    """
+    normal, along = np.array(touched.normal), np.array(touched.along)
+    press, at_m = _list(-newton * normal), _list(np.array(touched.at_m))
+    hold = {"path": "hold", "at_m": at_m}
+    match hand:
+        case "press":
+            force = _list(-newton * (normal + lean * along))
+            return {"profile": "press", "newton": force, "duration_s": 0.2}, hold
+        case "stroke":
+            stroke = {"profile": "stroke", "newton": press, "along_newton": _list(amplitude * along)}
+            return {**stroke, "frequency_hz": pace_hz}, hold
+        case "tap":
+            tap = {"profile": "tap", "newton": press, "period_s": digits(1.0 / pace_hz)}
+            return {**tap, "release_newton": _list(0.5 * normal)}, hold
+        case "circle":
+            circle = {"path": "circle", "centre_m": at_m, "radius_m": radius_m, "frequency_hz": pace_hz}
+            return {"profile": "constant", "newton": press}, circle
+        case _:
+            return {"profile": "let-go", "newton": press, "at_s": LETS_GO_S}, hold
+
+
+def _inertia(
+    coupling: float, masses_kg: list[float], turn: Any, coulomb_n: list[float], at_m: Vector
+) -> tuple[dict[str, Any], dict[str, Any], Any]:
+    """How the axes are coupled: what that adds to the options of the device, to those in space, and the mass matrix.
+
+    Args:
+        coupling: below 0.4: not at all, below 0.8: by a constant matrix, else by a linkage.
+        masses_kg: by axis, as the case may be of the matrix turned straight [kg].
+        turn: rotation of the matrix.
+        coulomb_n: friction of axes by themselves, none where it is empty [N].
+        at_m: where the matrix is looked at [m].
+    """
+    if coupling < 0.4:
+        friction = {"coulomb_n": coulomb_n} if coulomb_n else {}
+        return {}, {"mass_kg": masses_kg, **friction}, np.diag(masses_kg)
+    if coupling < 0.8:
+        matrix = turn @ np.diag(masses_kg) @ turn.T
+        matrix = 0.5 * (matrix + matrix.T)
+        return {}, {"mass_matrix_kg": matrix.tolist()}, matrix
+    matrix = np.array(mass_matrix(masses_kg[0], [0.0] * 3, *at_m))
+    return {"mass_kg": masses_kg[0]}, {"linkage": "delta"}, matrix
 
 
 def _turn(source: Random) -> Any:
