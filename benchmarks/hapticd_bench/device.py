@@ -33,8 +33,6 @@ MOST_N = 1e-3
 ROUNDS = 4
 """Blocks that the ticks are divided into; a device is opened and armed twice in each."""
 
-SIMULATED = "loopback"
-
 _PIECES = ("nothing", "read", "step", "write", "record")
 _TABLES = ("loop", "velocity", "controller")
 _WALL = {"position_m": 10.0, "stiffness_n_per_m": 1.0}
