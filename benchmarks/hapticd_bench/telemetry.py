@@ -25,9 +25,10 @@ import zmq
 
 from hapticd.config.models import TelemetryConfig
 from hapticd.device import DeviceInfo
+from hapticd.telemetry.clock import measure_epoch_offset_ns
 from hapticd.telemetry.publisher import Publisher
 from hapticd.telemetry.records import Status
-from hapticd.telemetry.wire import Topic, measure_epoch_offset_ns
+from hapticd.telemetry.wire import Topic
 from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.flags import Flag
 from hapticd.tick.record import TickRecord

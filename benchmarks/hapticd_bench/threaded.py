@@ -21,8 +21,8 @@ from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
 from hapticd.supervisor.daemon import DRAIN_S
+from hapticd.telemetry.clock import measure_epoch_offset_ns
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.wire import measure_epoch_offset_ns
 from hapticd.tick.assemble import make_tick, place_device
 from hapticd.tick.record import RecordLayout
 from hapticd_bench.tick import KeptRecords

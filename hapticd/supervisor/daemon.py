@@ -26,8 +26,8 @@ from hapticd.supervisor.state import DaemonState
 from hapticd.supervisor.status import StatusBuilder
 from hapticd.supervisor.systemd import Notifier
 from hapticd.supervisor.terminal import Terminal
+from hapticd.telemetry.clock import followed_offset_ns, measure_epoch_offset_ns
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.wire import followed_offset_ns, measure_epoch_offset_ns
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.flags import Flag
 from hapticd.tick.record import TickRecord

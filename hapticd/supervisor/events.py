@@ -12,8 +12,8 @@ from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.fault_recorder import FaultRecorder
 from hapticd.supervisor.metrics import MetricWatch
 from hapticd.supervisor.status import StatusBuilder
+from hapticd.telemetry.clock import timestamp_s
 from hapticd.telemetry.publisher import Publisher
-from hapticd.telemetry.wire import timestamp_s
 from hapticd.tick.event import EventCode, LoopEvent
 
 FLOOD = 1000

@@ -17,8 +17,8 @@ from hapticd.loop.resume import ResumeState
 from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.metrics import values_of
 from hapticd.supervisor.recovery import Recovery
+from hapticd.telemetry.clock import timestamp_s
 from hapticd.telemetry.records import LateHistogram, Status
-from hapticd.telemetry.wire import timestamp_s
 from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.flags import Flag
 from hapticd.tick.guard import limits

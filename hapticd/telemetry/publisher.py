@@ -24,7 +24,8 @@ from hapticd.keys.policy import stays_here
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
 from hapticd.telemetry import wire
-from hapticd.telemetry.wire import INVALID, Inputs, Map, Topic, timestamp_s
+from hapticd.telemetry.clock import timestamp_s
+from hapticd.telemetry.wire import INVALID, Inputs, Map, Topic
 from hapticd.tick.contact_record import WallRecord
 from hapticd.tick.event import LoopEvent
 from hapticd.tick.record import TickRecord
@@ -77,7 +78,7 @@ class Publisher:
         config: the [telemetry] table.
         ipc_path: where to publish to this computer, None for nowhere; `config.ipc` = false is obeyed as well.
         info: what the device reports besides its position.
-        epoch_offset_ns: `wire.measure_epoch_offset_ns` at the start.
+        epoch_offset_ns: `clock.measure_epoch_offset_ns` at the start.
         ring: the keys that an endpoint for other computers takes; without them there can be none.
 
     Raises:

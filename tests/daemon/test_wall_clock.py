@@ -18,7 +18,7 @@ WALL_CLOCK = {"time", "time_ns", "now", "utcnow", "today", "CLOCK_REALTIME", "CL
 """Names of `time` and `datetime` by which the time of day is read."""
 
 STAMPS = {
-    "hapticd/telemetry/wire.py": "the timestamps of telemetry, once a second",
+    "hapticd/telemetry/clock.py": "the timestamps of telemetry, once a second",
     "views/hapticd_views/commands/record.py": "the name of a recording",
     "views/hapticd_views/lsl/bridge.py": "telemetry's timestamps back to LSL's clock",
     "views/hapticd_views/recording/recorder.py": "when a recording began",
