@@ -72,8 +72,11 @@ def blended(state: Any, x_m: float, force_n: float, periods: float) -> float:
         force_n: the new force [N].
         periods: time since the last tick, in periods of the loop; more than one where deadlines were skipped.
     """
-    state.blend_tick = done = state.blend_tick + periods
-    weight: float = done / state.blend_ticks if done > 0.0 else 0.0
+    done: float = state.blend_tick + periods
+    if done < 0.0:  # the first tick was sooner than a period after the one before: begun it has all the same
+        done = 0.0
+    state.blend_tick = done
+    weight: float = done / state.blend_ticks
     reach_n: float = state.blend_limit_n
     if weight >= 1.0:
         if weight >= 2.0 or -reach_n <= force_n <= reach_n:

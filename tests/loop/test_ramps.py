@@ -8,7 +8,7 @@ from types import MethodType
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hapticd.config.loading import parse
@@ -204,6 +204,7 @@ def test_without_a_position_the_force_is_out_ten_milliseconds_after_that_is_know
 
 @examples(30)
 @given(reads_s=READS_S, news_s=st.sampled_from([0.0, 0.25e-3, 1e-3, 3e-3, 8e-3]))
+@example(reads_s=[1.953125e-3, 0.0], news_s=8e-3)  # the news comes with a tick that is sooner than a period
 def test_another_law_is_in_force_once_its_ramp_is_over(
     monkeypatch: pytest.MonkeyPatch, reads_s: list[float], news_s: float
 ) -> None:
