@@ -147,7 +147,8 @@ ROOMS = {
         tuple(
             f"hapticd/keys/{name}.py"
             for name in (
-                "connections", "file", "frames", "heartbeat", "local_bind", "memory", "policy", "server", "store"
+                "connections", "file", "frames", "heartbeat", "local_bind", "memory", "owners", "policy", "server",
+                "store",
             )
         ),
         ("tests/keys",),

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
-from hapticd.tick.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, blended, start_blend
+from hapticd.tick.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, blended, blended_again, start_blend
 
 PERIOD_S = 1e-3
 FORCES = st.lists(st.floats(-1e18, 1e18), min_size=1, max_size=3)
@@ -276,6 +276,14 @@ def test_a_blend_starts_at_the_old_force_and_lets_it_out_with_the_depth() -> Non
     assert blended(state, -5e-4, 100.0, 1.0) == 3.0
     start_blend(state, 6.0, -1e-3, 12.0, 50)
     assert blended(state, -4e-3, 100.0, 1.0) == 6.0
+
+
+def test_a_blend_begins_with_its_first_sample_however_soon_that_tick_comes() -> None:
+    state = SimpleNamespace()
+    start_blend(state, 5.0, -1e-3, 12.0, 50)
+    assert blended_again(state, -1e-3, 11.0, 1.0) == 5.0  # what to go over to is not known yet
+    assert blended(state, -1e-3, 11.0, 0.05) == 5.0
+    assert blended_again(state, -1e-3, 11.0, 25.0) == 8.0
 
 
 def test_a_blend_without_a_limit_ends_with_its_ticks() -> None:
