@@ -37,7 +37,7 @@ help:
 	@echo "make lint     formatting, style, types and import rules only"
 	@echo "make web      uPlot for hapticd dashboard, by npm, in the version and with the hash that views/ names"
 	@echo "make nightly  the long runs: every shipped configuration, every property on many examples"
-	@echo "make repeat   tests that start a daemon, again and again: REPEAT=50, REPEAT_TESTS=files, REPEAT_WORKERS=3"
+	@echo "make repeat   tests that start a daemon, again and again: REPEAT=50, REPEAT_TESTS=files, REPEAT_WORKERS=5"
 	@echo "make bench    how long a tick takes on this machine"
 	@echo "make install  the daemon as a system service (as root); PREFIX=$(PREFIX), DESTDIR for packages"
 	@echo "make uninstall  all of that away again, except configurations and fault records"
@@ -92,12 +92,12 @@ nightly: packages web clients $(READY)
 	EXAMPLES=30 $(BIN)/pytest -m "hypothesis and not nightly" --timeout 3600 --override-ini faulthandler_timeout=3660
 	$(MAKE) repeat
 
-# Every test that starts a daemon, again and again beside a busy processor, three side by side. The whole takes more
-# than a night; stopped, it goes on with what has run least, and a run counts until something changes that its test
-# depends on (tests/tally.py, tests/content.py). A part of it:
+# Every test that starts a daemon, again and again beside a busy processor, five side by side. The whole takes four
+# hours of two processors; stopped, it goes on with what has run least, and a run counts until something changes that its
+# test depends on (tests/tally.py, tests/content.py). A part of it:
 # make repeat REPEAT=10 REPEAT_TESTS=tests/daemon/test_deaths.py
 REPEAT ?= 50
-REPEAT_WORKERS ?= 3
+REPEAT_WORKERS ?= 5
 REPEAT_TESTS ?= tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views tests/remote \
     tests/doctor tests/driven tests/your_simulator tests/service/test_systemd.py tests/test_readme.py \
     tests/test_bridges_page.py tests/test_python_page.py

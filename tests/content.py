@@ -9,6 +9,8 @@ from functools import cached_property
 from pathlib import Path
 
 FIRST = "tests/conftest.py"
+KEPT = "docs/repeats.jsonl"
+"""How often tests have run, which no test depends on."""
 
 
 class Content:
@@ -45,7 +47,7 @@ class Content:
     def _counts(name: str, pages: bool) -> bool:
         if name.endswith(".md"):
             return pages
-        return not (name.startswith("tests/") and name.endswith(".py"))
+        return name != KEPT and not (name.startswith("tests/") and name.endswith(".py"))
 
     @cached_property
     def _files(self) -> list[str]:

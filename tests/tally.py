@@ -1,13 +1,16 @@
-"""How often each test has run, in a file to which every process adds: what was stopped goes on from there."""
+"""How often each test has run, in a file to which every process adds: what was stopped goes on from there.
+
+`python -m tests.tally` keeps what was counted with the checkout, so that another computer goes on from there as well.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from tests.content import Content
+from tests.content import KEPT, Content
 
 ROOT = Path(__file__).parent.parent
 STEPS = (50, 20, 10, 2, 1, 0)
@@ -31,7 +34,7 @@ class Count:
 
 def opened() -> Tally:
     """The tally of this checkout."""
-    return Tally(ROOT / "build" / "repeats.jsonl", Content(ROOT).of)
+    return Tally(ROOT / "build" / "repeats.jsonl", Content(ROOT).of, ROOT / KEPT)
 
 
 class Tally:
@@ -40,11 +43,13 @@ class Tally:
     Args:
         path: the file.
         version: of a test, by its name.
+        kept: what was counted on other computers, a line a test.
     """
 
-    def __init__(self, path: Path, version: Callable[[str], str]) -> None:
+    def __init__(self, path: Path, version: Callable[[str], str], kept: Path | None = None) -> None:
         self._path = path
         self._version = version
+        self._kept = kept
         self._counts = self._read()
 
     def add(self, test: str, *, passed: bool, daemon: bool) -> None:
@@ -54,6 +59,17 @@ class Tally:
         line = {"version": self._version(test), "test": test, "passed": passed, "daemon": daemon}
         with self._path.open("ab", buffering=0) as file:
             file.write(json.dumps(line).encode() + b"\n")
+
+    def keep(self) -> None:
+        """Move what has been counted of the tests as they are to the file that is kept."""
+        assert self._kept is not None
+        lines = [
+            json.dumps({"version": self._version(test), "test": test, **asdict(count)})
+            for test, count in sorted(self._read().items())
+            if count.daemon
+        ]
+        self._kept.write_text("".join(f"{line}\n" for line in lines))
+        self._path.unlink(missing_ok=True)
 
     def passes(self, test: str) -> int:
         """How often a test has passed since it failed last."""
@@ -84,8 +100,18 @@ class Tally:
 
     def _read(self) -> dict[str, Count]:
         counts: dict[str, Count] = {}
-        for line in self._path.read_text().splitlines() if self._path.exists() else ():
-            run = json.loads(line)
-            if run["version"] == self._version(run["test"]):
-                counts.setdefault(run["test"], Count()).add(run["passed"], run["daemon"])
+        for file in (self._kept, self._path):
+            for line in file.read_text().splitlines() if file is not None and file.exists() else ():
+                run = json.loads(line)
+                test = run["test"]
+                if run["version"] != self._version(test):
+                    continue
+                if "passes" in run:
+                    counts[test] = Count(run["passes"], run["failures"], run["daemon"])
+                else:
+                    counts.setdefault(test, Count()).add(run["passed"], run["daemon"])
         return counts
+
+
+if __name__ == "__main__":
+    opened().keep()

@@ -95,6 +95,23 @@ def test_only_runs_of_the_same_version_count(tmp_path: Path) -> None:
     assert Tally(tmp_path / "tally", lambda test: "two").passes("test_it") == 0
 
 
+def test_what_is_kept_goes_on_counting_on_another_computer(tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    tally = Tally(tmp_path / "tally", lambda test: "one", kept)
+    for passed in (True, False, True, True):
+        tally.add("test_it", passed=passed, daemon=True)
+    tally.add("test_without_a_daemon", passed=True, daemon=False)
+    tally.keep()
+    other = Tally(tmp_path / "other", lambda test: "one", kept)
+    other.add("test_it", passed=True, daemon=True)
+    other.keep()
+    assert not (tmp_path / "tally").exists()
+    last = Tally(tmp_path / "last", lambda test: "one", kept)
+    assert (last.passes("test_it"), last.passes("test_without_a_daemon")) == (3, 0)
+    assert "  test_it: 1 times, then passed 3" in last.lines()
+    assert Tally(tmp_path / "last", lambda test: "two", kept).passes("test_it") == 0
+
+
 @pytest.mark.parametrize(("begun", "code"), [(True, pytest.ExitCode.OK), (False, pytest.ExitCode.NO_TESTS_COLLECTED)])
 def test_that_all_have_run_often_enough_is_no_failure(tmp_path: Path, begun: bool, code: pytest.ExitCode) -> None:
     tally = Tally(tmp_path / "tally", lambda test: "one")
@@ -139,6 +156,7 @@ RIG, PAGE = "tests/drivers/test_rig.py::test_it", "tests/test_page.py::test_it[1
         ("tests/drivers/test_other.py", set()),
         ("tests/dealing.py", set()),
         ("build/repeats.jsonl", set()),
+        ("docs/repeats.jsonl", set()),
     ],
 )
 def test_a_test_is_of_another_version_after_a_change_of_what_it_depends_on(
