@@ -12,6 +12,7 @@ import contextlib
 import os
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -40,10 +41,18 @@ class Repeating:
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
-        """Leave out what has run often enough before, and begin with what has run least."""
+        """Leave out what has run often enough before, and begin with what has run least, a test of each file in turn.
+
+        Tests of one file may wait for each other: those of the installed service have one machine.
+        """
         due = [item for item in items if not self._tally.done(item.nodeid, self._times)]
         config.hook.pytest_deselected(items=[item for item in items if item not in due])
-        items[:] = sorted(due, key=lambda item: self._tally.passes(item.nodeid))
+        turns: Counter[Path] = Counter()
+        order = {}
+        for item in due:
+            turns[item.path] += 1
+            order[item] = (self._tally.passes(item.nodeid), turns[item.path])
+        items[:] = sorted(due, key=order.__getitem__)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item, nextitem: pytest.Item | None) -> bool:

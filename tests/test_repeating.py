@@ -86,6 +86,14 @@ def test_a_stopped_run_goes_on_with_what_has_run_least(tmp_path: Path) -> None:
     assert "test_it.py::test_that_fails_at_last: 2 times, then passed 0" in said
 
 
+def test_files_take_turns(tmp_path: Path) -> None:
+    (tmp_path / "conftest.py").write_text(CONFTEST)
+    for name in "ab":
+        note = f"open('runs', 'a').write('{name}')"
+        (tmp_path / f"test_{name}.py").write_text("".join(f"def test_{at}(): {note}\n" for at in range(3)))
+    assert runs(tmp_path, "no")[1].replace("<", "") == "ababab"
+
+
 def test_only_runs_of_the_same_version_count(tmp_path: Path) -> None:
     tally = Tally(tmp_path / "tally", lambda test: "one")
     for passed in (True, False, True, True):
