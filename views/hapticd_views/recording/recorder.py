@@ -180,7 +180,7 @@ class Recorder:
         self._file = RecordingFile(path, self._overwrite)
         self.progress.files.append(path)
         self._committed_s = self._file_since_s = time.monotonic()
-        self._first_s: float | None = None
+        self._span_s: tuple[float, float] | None = None  # the first and the last time in the chunk
         self._full_since_s: float | None = None
         self._last_s = time.time()
         if self._receipt:
@@ -216,11 +216,7 @@ class Recorder:
                 continue
             if isinstance(record, Status):
                 self._look_at(record)
-            if self._first_s is None:
-                self._first_s = record.timestamp
-            elif abs(record.timestamp - self._first_s) >= CHUNK_S:
-                self._commit()
-                self._first_s = record.timestamp
+            self._widen(record.timestamp)
             for gap in self._gaps:
                 self._file.add(recorded_gap(gap, record.timestamp), record.timestamp)
                 if gap.topic is Position.topic:
@@ -233,6 +229,16 @@ class Recorder:
                 self.progress.ticks += 1
             if isinstance(record, Tick):
                 self._seqs[record.topic] = record.seq
+
+    def _widen(self, timestamp: float) -> None:
+        """Begin a chunk where this one would get too long; one topic may come behind another."""
+        span = self._span_s
+        if span is not None:
+            span = min(span[0], timestamp), max(span[1], timestamp)
+            if span[1] - span[0] >= CHUNK_S:
+                self._commit()
+                span = None
+        self._span_s = span or (timestamp, timestamp)
 
     def _look_at(self, status: Status) -> None:
         """Write a receipt where another configuration is in force, or another daemon."""
@@ -259,7 +265,7 @@ class Recorder:
 
     def _commit(self) -> None:
         self._file.commit()
-        self._first_s = None
+        self._span_s = None
         now_s = self._committed_s = time.monotonic()
         self.progress.bytes = self._written_bytes + self._file.size
         if now_s - self._synced_s >= SYNC_S:
