@@ -165,6 +165,7 @@ RIG, PAGE = "tests/drivers/test_rig.py::test_it", "tests/test_page.py::test_it[1
         ("tests/dealing.py", set()),
         ("build/repeats.jsonl", set()),
         ("docs/repeats.jsonl", set()),
+        ("docs/repeats.md", set()),
     ],
 )
 def test_a_test_is_of_another_version_after_a_change_of_what_it_depends_on(

@@ -11,8 +11,6 @@ from hapticd.client import EventCode, RefusedError, connect
 from tests.daemon.running import HAPTICD, Daemon
 
 CONFIG = """
-[loop]
-realtime = "off"
 [device]
 driver = "loopback"
 [[scene.walls]]

@@ -50,6 +50,7 @@ def test_it_finds_the_stop_and_the_controllers_remember_home(bench: Lab) -> None
     driver.enable()
     driver.close()
     again = bench.driver(axes=axes(1))
+    again._state_wait_s = PATIENCE_S
     again.open()  # another start of the daemon
     assert again.read().calibrated
     assert again.read().position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=2e-4)

@@ -31,7 +31,8 @@ def names() -> Iterator[str]:
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     """For each test what became of it under each of its parameters: "" when it passed."""
     report = tmp_path_factory.mktemp("inside") / "report.xml"
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "UMOCKDEV_"))}
+    ours = ("PYTEST_", "UMOCKDEV_", "REPEAT", "TAKEN_MS")  # repeated, and disturbed, from out here
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
     done = subprocess.run(
         [sys.executable, "-m", "pytest", str(INSIDE), "-q", "-p", "no:cacheprovider", f"--junit-xml={report}"],
         env={**kept, "LD_PRELOAD": PRELOAD},
