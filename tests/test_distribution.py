@@ -69,6 +69,8 @@ def test_the_wheel_has_all_that_runs_and_nothing_else(wheel: zipfile.ZipFile) ->
         "share/drivers/udev/70-hapticd.rules",
     ):
         assert f"hapticd/{name}" in names
+    for plugins in ("hapticd_drivers", "hapticd_controllers"):
+        assert f"{plugins}/py.typed" in names
     shipped = {path.name for path in (ROOT / "systemd").iterdir()}
     assert {name.rpartition("/")[2] for name in names if name.startswith("hapticd/share/systemd/")} == shipped
     assert [name for name in names if name.endswith((".pyc", ".toml~", ".orig"))] == []
@@ -109,6 +111,18 @@ def test_the_source_distribution_has_all_that_is_in_the_tree(source: Path) -> No
     # What is not committed yet may be in it; what tools leave may not.
     assert [name for name in made - tree if name.split("/")[0] in (".venv", "dist", ".git") or "cache" in name] == []
     assert "PKG-INFO" in made
+
+
+def test_to_run_it_nothing_is_installed_that_only_tests_need_and_all_in_the_versions_that_were_tested() -> None:
+    lines = (ROOT / "Makefile").read_text().replace("\\\n", " ").splitlines()
+    installs = [line.strip() for line in lines if "PIP_INSTALL" in line or "-m pip install" in line]
+    assert [line for line in installs if line.startswith("$(PIP_INSTALL)")] == [
+        "$(PIP_INSTALL) .",
+        "$(PIP_INSTALL) '.[dev]'",
+    ]
+    own = [line for line in installs if "-m pip install" in line]
+    assert len(own) == 2
+    assert all("--constraint $(CONSTRAINTS)" in line for line in own)
 
 
 def pinned() -> dict[str, str]:

@@ -136,7 +136,8 @@ def test_a_directory_that_somebody_else_made_in_tmp_is_not_trusted(user: Path, m
     foreign = user / "tmp" / "hapticd-1000"
     sockets_of(foreign / "default")
     with living_in(foreign / "default"):
-        monkeypatch.setattr(paths, "_ours", lambda _: False)
+        user_id = foreign.stat().st_uid
+        monkeypatch.setattr(os, "geteuid", lambda: user_id + 1)
         with pytest.raises(InstanceError, match="belongs to somebody else"):
             locate("telemetry")
         system = sockets_of(user / "run" / "hapticd" / "default")

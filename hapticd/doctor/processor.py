@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 from pathlib import Path
 
 from hapticd.config.models import LoopConfig
@@ -17,13 +18,19 @@ _CPUS = "sys/devices/system/cpu"
 _SHALLOW_US = 20
 
 
-def architecture(machine: str | None = None) -> Finding:
-    """Whether the processor keeps its stores in order, which the two processes of the daemon rely on.
+def architecture(machine: str | None = None, largest: int = sys.maxsize) -> Finding:
+    """Whether stores stay in order and in one go, which the two processes of the daemon rely on.
 
     Args:
         machine: name of the architecture; asked for when not given.
+        largest: length that this Python can count to, which tells how many bits it has.
     """
     machine = machine or platform.machine()
+    if machine in _ORDERED and largest < 1 << 32:
+        return problem(
+            "a Python of 32 bits: it stores a word of the ring in two goes, so the daemon does not start with it",
+            "# install hapticd with a 64-bit Python",
+        )
     if machine in _ORDERED:
         return ok(f"{machine}: stores stay in order, as the shared ring needs it")
     return problem(

@@ -4,7 +4,8 @@
 
 One writer a word. A ring's counter is stored after its slot, and the reader looks at the counter again after it has
 copied a slot: on x86-64 stores become visible in order and a word in one go, so what was not overwritten by then is
-whole. Other machines do not promise that, and plain Python cannot ask them to, so they are refused.
+whole. Other machines do not promise that, nor does a 32-bit Python on this one, and plain Python cannot
+ask them to, so they are refused.
 
 The memory is an anonymous file: it has no name, and it is gone when both processes are.
 """
@@ -14,6 +15,7 @@ from __future__ import annotations
 import mmap
 import os
 import platform
+import sys
 from typing import Any
 
 import msgpack
@@ -99,7 +101,7 @@ class SharedMemory:
         descriptor: file descriptor to hand to the other process.
 
     Raises:
-        HapticdError: this processor does not keep stores in order.
+        HapticdError: this processor does not keep stores in order, or this Python does not store a word in one go.
     """
 
     def __init__(self, layout: RecordLayout, rate_hz: float, descriptor: int | None = None) -> None:
@@ -107,6 +109,8 @@ class SharedMemory:
             raise HapticdError(
                 f"hapticd needs a 64-bit x86 processor: on {platform.machine()} the shared ring is not safe"
             )
+        if sys.maxsize < 1 << 32:
+            raise HapticdError("hapticd needs a 64-bit Python: one of 32 bits stores a word of the ring in two goes")
         self.layout = layout
         self.slots = int(HISTORY_S * rate_hz)
         size = _RECORDS + self.slots * layout.size

@@ -145,7 +145,7 @@ def test_mass_and_delay_are_felt(mass_kg: float, delay_samples: int) -> None:
 
 @pytest.mark.parametrize("learned", [True, False])
 def test_no_mass_is_read_from_forces_that_do_not_vary(learned: bool) -> None:
-    """20 s of a hand that moves against the 12 N of the limit: 0.25 kg read 2066 kg, and the cap was none."""
+    """C5: 20 s of a hand that moves against the 12 N of the limit: 0.25 kg read 2066 kg, and the cap was none."""
     rig = Rig(energy_cycle, Device(resolution_m=2e-6, stiffness_n_per_m=10e3))
     if learned:
         rig.run(3.0)
@@ -304,7 +304,7 @@ PAIRED = {"exact": 3.0 * 0.5, "held-power": 3.0 * 4.0 * 2e-3, "new-force": 7.0 *
 @pytest.mark.parametrize("pairing", PAIRED)
 @pytest.mark.parametrize("work", ["spring", "total"])
 def test_each_pairing_counts_the_work_of_its_force_along_its_move(pairing: str, work: str) -> None:
-    """One tick: 3 N held by the wall and 2 N by the damper, 7 N new, 10 N s/m of damping, 0.5 m at 4 m/s and 2 ms."""
+    """T7: 3 N held by the wall and 2 N by the damper, 7 N new, 10 N s/m of damping, 0.5 m at 4 m/s and 2 ms."""
     read = Params.model_validate({"pairing": pairing, "work": work, "force_delay": "none"})
     params = plain_object("Params", scalar_params(read))
     state = fresh_state(energy_cycle)
@@ -322,6 +322,7 @@ def test_each_pairing_counts_the_work_of_its_force_along_its_move(pairing: str, 
 
 
 def test_the_travel_of_a_cycle_is_from_its_deepest_to_its_highest_point_inside() -> None:
+    """T7."""
     params = plain_object("Params", scalar_params(Params()))
     state = fresh_state(energy_cycle)
     energy_cycle.start(state, params, LawSnapshot(x_m=-2e-3))
@@ -333,6 +334,7 @@ def test_the_travel_of_a_cycle_is_from_its_deepest_to_its_highest_point_inside()
 
 
 def test_the_caps_are_what_the_page_says() -> None:
+    """T7."""
     page = (Path(__file__).parents[2] / "docs" / "controllers.md").read_text()
     rows = re.findall(r"^\| (`[a-z_]+`(?:, `[a-z_]+`)*) \| ([^|]+) \|", page, re.MULTILINE)
     told: dict[str, str] = {}

@@ -89,7 +89,7 @@ def outside(rig: Rig, seconds: float = 0.05) -> None:
 
 @pytest.mark.parametrize("reset", ["contact", "never"])
 def test_a_debt_survives_the_loss_of_contact(reset: Literal["contact", "never"]) -> None:
-    """It is paid in the next contact: leaving the wall forgives nothing."""
+    """T1: it is paid in the next contact: leaving the wall forgives nothing."""
     rig = Rig(tdpa, Device(), Params(reset=reset))
     rig.run(0.5)
     rig.state.energy_j = -0.5
@@ -108,6 +108,7 @@ def test_a_debt_survives_the_loss_of_contact(reset: Literal["contact", "never"])
 def test_only_a_law_that_never_resets_keeps_a_credit_without_contact(
     reset: Literal["contact", "never"], kept: bool
 ) -> None:
+    """T1."""
     rig = Rig(tdpa, Device(), Params(reset=reset))
     rig.run(0.5)
     rig.state.energy_j = 0.5

@@ -14,12 +14,16 @@ import pytest
 
 from hapticd.config.loading import parse
 from hapticd.device import DeviceInfo
+from hapticd.faults.record import read_header
+from hapticd.faults.store import FaultStore
 from hapticd.loop.memory import SharedMemory
 from hapticd.loop.resume import FROM_START
 from hapticd.supervisor.child import LoopProcess
+from hapticd.supervisor.events import EventLog
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.status import StatusBuilder
 from hapticd.telemetry.records import Status
+from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.flags import Flag
 from hapticd.tick.record import RecordLayout, TickRecord
 from tests.daemon.running import Daemon, Subscriber
@@ -119,6 +123,19 @@ def test_the_rate_is_that_of_the_ticks_and_not_of_when_they_were_fetched(
         now_s += passed_s
         rates.append(made(status, loop, recovery).measured_rate_hz)
     assert rates == pytest.approx([1000.0, 1000.0, 1000.0, 0.0])
+
+
+def test_a_fault_after_a_suspend_has_the_time_that_the_clock_tells_then(loop: LoopProcess, tmp_path: Path) -> None:
+    """S10: status and fault records went on by the clock of the start."""
+    status = StatusBuilder("default", 0, Path("/lab.toml"))
+    event_log = EventLog("default", Mock(), status, tmp_path, 0)
+    status.follow_clock(3_600_000_000_000)
+    event_log.follow_clock(3_600_000_000_000)
+    event_log.tell(LoopEvent(EventCode.OVER_SPEED, "too fast", 0, 2_000_000_000), CONFIG, loop)
+    assert event_log.recorder.close(5, 10.0) == ""
+    (path,) = FaultStore(tmp_path).paths()
+    assert read_header(path)["event"]["timestamp"] == 3602.0
+    assert made(status, loop, Recovery(Mock())).fault_timestamp == 3602.0
 
 
 def test_who_comes_once_it_is_ready_finds_no_status_of_before_the_first_tick(tmp_path: Path) -> None:

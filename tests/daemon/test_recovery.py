@@ -198,10 +198,12 @@ def lost(monkeypatch: pytest.MonkeyPatch) -> Lost:
 
 
 def test_the_waits_double_from_one_second_to_thirty(lost: Lost) -> None:
+    """T8."""
     assert lost.waits_s(8) == pytest.approx([1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0, 30.0], abs=0.02)
 
 
 def test_what_is_plugged_in_is_tried_a_second_later_and_the_waits_begin_anew(lost: Lost) -> None:
+    """T8."""
     lost.waits_s(6)
     lost.plugged_in = True
     assert lost.waits_s(4) == pytest.approx([1.0, 1.0, 2.0, 4.0], abs=0.02)
@@ -211,6 +213,7 @@ def test_what_is_plugged_in_is_tried_a_second_later_and_the_waits_begin_anew(los
 def test_a_device_that_stayed_for_a_minute_is_looked_for_as_if_for_the_first_time(
     monkeypatch: pytest.MonkeyPatch, lost: Lost, steady_s: float, waits_s: list[float]
 ) -> None:
+    """T8."""
     lost.waits_s(2)  # the next one that fails is followed by 8 s
     found = SimpleNamespace(poll=lambda: LOST, end=lambda: None)
     refuse = lost._refuse

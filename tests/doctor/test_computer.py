@@ -96,9 +96,11 @@ def test_a_slow_clock_is_changed_where_there_is_a_faster_one(machine: Machine, a
 
 
 def test_only_processors_that_keep_stores_in_order_run_the_daemon() -> None:
+    """C14."""
     says(processor.architecture("x86_64"), "ok")
     for machine in ("aarch64", "i686"):
         says(processor.architecture(machine), "problem", machine)
+    says(processor.architecture("x86_64", 2**31 - 1), "problem", "a Python of 32 bits")
 
 
 def test_a_processor_that_is_not_there_cannot_be_chosen(machine: Machine) -> None:

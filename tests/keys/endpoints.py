@@ -35,6 +35,7 @@ class Endpoints:
         self.telemetry = self.publisher.endpoints[1].replace("0.0.0.0", "127.0.0.2")
         self.control = str(self.commands.endpoint).replace("0.0.0.0", "127.0.0.2")
         self.asked: list[str] = []
+        self.askers: list[str] = []
         self.granting: Callable[[], None] = lambda: None
         self.clients: list[Client] = []
         self.context = zmq.Context()
@@ -53,8 +54,9 @@ class Endpoints:
     def turn(self) -> None:
         """What the supervisor does in each of its turns; every request is granted."""
         self.publisher.service()
-        for request, reply, _ in self.commands.receive():
+        for request, reply, who in self.commands.receive():
             self.asked.append(request["do"])
+            self.askers.append(who)
             self.granting()
             reply(True, request["do"])
 

@@ -153,6 +153,18 @@ def test_who_commands_the_removal_of_a_key_gets_the_answer() -> None:
         endpoints.turn_until(commander.turned_away, "a refusal")
 
 
+def test_who_commands_is_known_by_the_name_of_its_key() -> None:
+    """S10: the log never said who armed."""
+    with served() as endpoints:
+        commander = endpoints.client(zmq.DEALER, endpoints.control, LAPTOP)
+        for listed in ("laptop", "renamed"):
+            endpoints.admit(ring_of(SERVER, **{listed: LAPTOP}))
+            commander.socket.send(ARM)
+            endpoints.turn_until(partial(commander.socket.poll, 0), "an answer")
+            commander.socket.recv()
+    assert endpoints.askers == ["laptop at 127.0.0.1", "renamed at 127.0.0.1"]
+
+
 def test_with_a_new_pair_of_the_daemon_clients_need_its_new_key() -> None:
     with served() as endpoints:
         laptop = endpoints.client(zmq.SUB, endpoints.telemetry, LAPTOP)
@@ -165,14 +177,20 @@ def test_with_a_new_pair_of_the_daemon_clients_need_its_new_key() -> None:
         endpoints.turn_until(lambda: again.received() > 0, "the status")
 
 
-def test_a_stranger_is_told_of_once_with_the_command_that_lists_it(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize(
+    ("door", "kind", "rights"), [("telemetry", zmq.SUB, " --watch-only"), ("control", zmq.DEALER, "")]
+)
+def test_a_stranger_is_told_of_once_with_the_command_that_lists_it(
+    caplog: pytest.LogCaptureFixture, door: str, kind: int, rights: str
+) -> None:
+    """S10: who had knocked at telemetry was to be listed with the right to command."""
     with served() as endpoints, caplog.at_level(logging.WARNING, "hapticd"):
         for _ in range(3):
-            stranger = endpoints.client(zmq.SUB, endpoints.telemetry, STRANGER)
+            stranger = endpoints.client(kind, getattr(endpoints, door), STRANGER)
             endpoints.turn_until(stranger.turned_away, "a refusal")
     (line,) = caplog.messages
     assert "refused 127.0.0.1" in line
-    assert line.endswith(f"hapticd keys add NAME {shlex.quote(STRANGER.public)} --watch-only"), (
+    assert line.endswith(f"hapticd keys add NAME {shlex.quote(STRANGER.public)}{rights}"), (
         "ready for a shell, whatever is in it"
     )
 
@@ -285,7 +303,7 @@ def test_an_address_of_ipv6_takes_keys_as_any_other() -> None:
 
 
 def test_who_has_shown_no_key_after_ten_seconds_is_disconnected_and_none_comes_in_where_no_one_is_asked() -> None:
-    """Its questions are closed before its socket is, and between the two lies a moment."""
+    """T6: its questions are closed before its socket is, and between the two lies a moment."""
     context = zmq.Context()
     socket = context.socket(zmq.ROUTER)
     bound = server.CurveServer(socket, "tcp://127.0.0.1:0", SERVER, frozenset({LAPTOP.public}))

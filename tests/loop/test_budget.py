@@ -48,6 +48,7 @@ def fails(
 
 
 def test_three_misses_within_ten_ticks_fail_a_law_and_fewer_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """T3."""
     assert (BUDGET_MISSES, BUDGET_TICKS) == (3, 10)
     assert not fails(monkeypatch, [3, 6])
     assert fails(monkeypatch, [3, 6, 9])

@@ -13,7 +13,7 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DriverError
 from hapticd.loop.loop import ControlLoop
-from hapticd.loop.memory import DISARM, SUPERVISOR_BEAT, EventReader, SharedMemory
+from hapticd.loop.memory import DISARM, DISARMED, SUPERVISOR_BEAT, EventReader, SharedMemory
 from hapticd.loop.resume import FROM_START, ResumeState, identity, left_by
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import EventCode
@@ -123,14 +123,28 @@ def test_a_device_that_was_disarmed_stays_disarmed(shared: SharedMemory) -> None
 
 
 def test_disarming_asked_for_in_the_tick_in_which_the_device_goes_is_kept(shared: SharedMemory) -> None:
+    """C3: it was forgotten, and the device armed by itself when it came back."""
+
     def ask(_loop: ControlLoop) -> None:
         shared.words[DISARM] += 1
 
     assert not lose(shared, last_tick(ask)).may_arm
 
 
+def test_disarming_that_was_acknowledged_right_before_the_device_goes_is_kept(shared: SharedMemory) -> None:
+    """C3: what was left said that the device may arm, since the last record did."""
+
+    def each_tick(_loop: ControlLoop, number: int) -> None:
+        if number == LOST_AT - 2:
+            shared.words[DISARM] += 1
+        elif number == LOST_AT - 1:
+            assert shared.words[DISARMED] == shared.words[DISARM]
+
+    assert not lose(shared, each_tick).may_arm
+
+
 def test_a_fault_in_the_tick_in_which_the_device_goes_is_told_and_latched(shared: SharedMemory) -> None:
-    """As a loop that is late because its device does not answer any more."""
+    """C3: as a loop that is late because its device does not answer any more."""
     left = lose(shared, last_tick(lambda loop: loop.session.tick.fail(EventCode.LOOP_LATE, "late")))
     assert (left.may_arm, left.latched) == (False, True)
     codes = [event.code for event in EventReader(shared).read()]
@@ -181,12 +195,32 @@ def test_a_fault_stays_latched_through_every_loop_until_it_is_cleared(shared: Sh
 
 
 def test_an_arm_that_was_sent_before_disarming_was_asked_for_does_not_arm(shared: SharedMemory) -> None:
-    """However late the loop finds it: the two words are not read at once."""
+    """C10: however late the loop finds it: the two words are not read at once."""
 
     def each_tick(_loop: ControlLoop, number: int) -> None:
         if number == 5:
             shared.post({"do": "arm"})
             shared.words[DISARM] += 1
+
+    left = lose(shared, each_tick, auto_arm=False)
+    assert not left.may_arm
+    assert "disarming was asked for after it" in shared.verdict()
+    assert EventCode.ARMED not in [event.code for event in EventReader(shared).read()]
+
+
+def test_an_arm_that_is_found_after_a_disarm_was_acknowledged_does_not_arm(
+    shared: SharedMemory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """C10: the loop is held up between the look at the one and the look at the other."""
+
+    def each_tick(loop: ControlLoop, number: int) -> None:
+        if number == 5:
+            monkeypatch.setattr(loop.requests, "work", lambda: None)
+            shared.post({"do": "arm"})
+            shared.words[DISARM] += 1
+        elif number == 6:
+            assert shared.words[DISARMED] == shared.words[DISARM]
+            monkeypatch.undo()
 
     left = lose(shared, each_tick, auto_arm=False)
     assert not left.may_arm

@@ -391,6 +391,14 @@ def test_the_history_is_eight_seconds_at_the_set_rate() -> None:
 
 @pytest.mark.parametrize("machine", ["aarch64", "i686"])
 def test_a_processor_that_reorders_or_tears_stores_is_refused(monkeypatch: pytest.MonkeyPatch, machine: str) -> None:
+    """C14: i686 was let in."""
     monkeypatch.setattr("platform.machine", lambda: machine)
     with pytest.raises(HapticdError, match=machine):
+        SharedMemory(LAYOUT, RATE_HZ)
+
+
+def test_a_python_of_32_bits_is_refused_on_any_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """C14: under a 64-bit kernel it is told x86_64, and would store half a word at a time."""
+    monkeypatch.setattr("sys.maxsize", 2**31 - 1)
+    with pytest.raises(HapticdError, match="64-bit Python"):
         SharedMemory(LAYOUT, RATE_HZ)

@@ -138,7 +138,7 @@ def test_a_release_is_over_in_its_time(monkeypatch: pytest.MonkeyPatch, reads_s:
 def test_a_force_is_held_no_longer_than_the_ramp_where_the_device_lets_it(
     monkeypatch: pytest.MonkeyPatch, read_s: float
 ) -> None:
-    """The first write after a read that outlasts the ramp is the first chance; at 10 ms a read it took 0.55 s."""
+    """C1: the first write after a read that outlasts the ramp is the first chance; at 10 ms a read it took 0.55 s."""
     bed = Bed(monkeypatch, [read_s])
     bed.forgives(True)
     done_s = bed.run(bed.tick.release)
@@ -168,7 +168,7 @@ def test_disarming_and_stopping_take_the_same_time(monkeypatch: pytest.MonkeyPat
 def test_a_loop_that_is_late_lets_go_within_the_time_to_see_it_and_a_ramp(
     monkeypatch: pytest.MonkeyPatch, read_s: float
 ) -> None:
-    """At 60 ms a read this took 3 s."""
+    """C1: at 60 ms a read this took 3 s."""
     bed = Bed(monkeypatch, [0.0])
 
     def slow_down() -> None:

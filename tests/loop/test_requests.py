@@ -199,7 +199,7 @@ LARGEST_SLICE = 6000
 
 @pytest.mark.parametrize("law", ["tdpa", "energy-cycle"])
 def test_no_slice_of_a_switch_of_eight_walls_costs_more_than_its_share(law: str) -> None:
-    """All that was done in the last slice took 42 613, and missed deadlines at 4 kHz."""
+    """C9: all that was done in the last slice took 42 613, and missed deadlines at 4 kHz."""
     walls = [EIGHT, EIGHT.replace("0.00", "0.02"), EIGHT.replace("100.0", "300.0")]
     start = configured(walls[0] + '[controller]\nlaw = "energy-cycle"\n')
     bench = Bench(start)

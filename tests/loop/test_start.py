@@ -21,7 +21,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> Started:
 
 
 def test_the_first_tick_finds_the_device_at_rest_where_it_is(started: Started) -> None:
-    """And not on the way there from the origin at 40 m/s."""
+    """T2: and not on the way there from the origin at 40 m/s."""
     seen: list[tuple[float, float, float]] = []
     started.driver.sample.position_m[0] = 0.04
 
@@ -39,6 +39,7 @@ def test_the_first_tick_finds_the_device_at_rest_where_it_is(started: Started) -
 def test_an_impossible_first_sample_is_a_fault_also_of_a_disarmed_device(
     monkeypatch: pytest.MonkeyPatch, at_m: float
 ) -> None:
+    """T2."""
     started = Started(Clock(monkeypatch), auto_arm=False)
     started.shared.words[SUPERVISOR_BEAT] = 1 << 62
     started.driver.sample.position_m[0] = at_m
@@ -48,6 +49,7 @@ def test_an_impossible_first_sample_is_a_fault_also_of_a_disarmed_device(
 
 
 def test_a_device_that_refuses_stays_disarmed_and_says_why(started: Started) -> None:
+    """T3."""
     started.driver.refusal = DeviceFaultError("its button is pressed")
     started.run(lambda _number: None, 3)
     assert [event.code for event in started.told] == [EventCode.STARTED, EventCode.DISARMED]
@@ -82,6 +84,7 @@ def test_a_force_begins_without_any_deadline_missed(monkeypatch: pytest.MonkeyPa
 
 
 def test_an_event_before_the_first_tick_has_the_time_that_it_is(started: Started) -> None:
+    """T3."""
     now_ns = started.clock.now_ns
     started.run(lambda _number: None, 3)
     assert [event.deadline_ns >= now_ns for event in started.told] == [True] * len(started.told)

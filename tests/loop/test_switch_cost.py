@@ -52,7 +52,7 @@ def slices(walls: int, change: str) -> tuple[list[int], int]:
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_to_change_eight_walls_costs_no_tick_more_than_it_has_itself(change: str) -> None:
-    """It is made ready wall by wall, and what is left for the last slice is less than the tick of those walls."""
+    """C9: it is made ready wall by wall, and what is left for the last slice is less than the tick of those walls."""
     found, tick = slices(WALLS, change)
     assert len(found) > WALLS
     assert max(found) < tick

@@ -38,7 +38,7 @@ def every_rate_with_each_of_the_rest() -> list[tuple[float, dict[str, Any], floa
 def test_it_is_armed_and_without_fault_to_its_end(
     rate_hz: float, kind: dict[str, Any], max_speed_m_per_s: float, workspace_m: tuple[float, float]
 ) -> None:
-    """Time went on by a nanosecond a tick: hands of 5e5 m/s, and a latched guard for half of it."""
+    """C8: time went on by a nanosecond a tick: hands of 5e5 m/s, and a latched guard for half of it."""
     inside: list[bool] = []
 
     def step(_state: Any, _params: Any, shown: Any) -> float:

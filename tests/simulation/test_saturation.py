@@ -44,7 +44,7 @@ def pressed(law: str = "none", device: str = "") -> tuple[ControlTick, Simulated
 
 @pytest.mark.parametrize("law", ["none", "tdpa", "energy-cycle", "ring-damping"])
 def test_the_books_and_the_law_have_the_energy_that_really_flowed(law: str) -> None:
-    """The actuator applies a force from the write to the next sample, so its work is exact."""
+    """C13: the actuator applies a force from the write to the next sample, so its work is exact."""
     tick, driver = pressed(law)
     flowed_j, saturated = 0.0, 0
     contact = tick.contacts[0]

@@ -324,7 +324,7 @@ def test_a_day_of_ticks_adds_up_to_less_than_a_microjoule_of_rounding() -> None:
 
 
 def test_a_ledger_that_begins_inside_the_wall_has_a_spring_that_nobody_pressed() -> None:
-    """What it holds was made: a hand that is let out gets it, and the books still balance."""
+    """T7: what it holds was made: a hand that is let out gets it, and the books still balance."""
     ledger = EnergyLedger()
     ledger.update(0.0, 0.0, 0.0, 0.5, True, 0.0, 1e-3)
     assert (ledger.energy_j, ledger.stored_j, ledger.generated_j, ledger.dissipated_j) == (0.0, 0.5, 0.5, 0.0)

@@ -294,7 +294,7 @@ def test_a_blend_without_a_limit_ends_with_its_ticks() -> None:
 
 
 def test_what_is_not_in_use_of_an_axis_limit_goes_at_once_however_low_it_falls() -> None:
-    """Below 1 N as well: 0.2 N along an axis from the tick after the change, with no force there yet."""
+    """T11: below 1 N as well: 0.2 N along an axis from the tick after the change, with no force there yet."""
     for force_n in ([0.0, 0.0, 0.0], [0.1, 0.0, -0.1]):
         made = armed()
         made.configure(SafetyConfig(max_axis_force_n=0.2), device(), force_n)

@@ -51,7 +51,7 @@ def test_what_one_law_published_is_not_said_of_the_next() -> None:
 
 
 def test_after_the_fallback_a_law_starts_without_the_fallbacks_damping() -> None:
-    """It started with 50 N s/m, and a damping that never decreases stayed there."""
+    """C4: it started with 50 N s/m, and a damping that never decreases stayed there."""
     rig = pressed(module=energy_cycle, safe_damping_n_s_per_m=50.0)
     rig.tick.fail_law(EventCode.LAW_OVER_BUDGET, "slow")
     rig.force(-2e-3, ticks=60)
@@ -63,6 +63,7 @@ def test_after_the_fallback_a_law_starts_without_the_fallbacks_damping() -> None
 
 
 def test_the_damping_of_one_sample_is_not_learned() -> None:
+    """C4: nor is TDPA's, which is for one sample."""
     rig = pressed(wall(12e3), module=tdpa)
     depth_m = 2e-4
     while rig.tick.contacts[0].damping_n_s_per_m == 0.0:  # a debt, by jumps that the hold pays for

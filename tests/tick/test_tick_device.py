@@ -254,6 +254,7 @@ def test_a_device_that_is_not_calibrated_may_say_anything_and_calibrated_it_need
 
 @pytest.mark.parametrize("ticks", [0, 30])
 def test_a_device_that_is_calibrated_and_still_makes_no_sense_is_a_fault(ticks: int) -> None:
+    """T4."""
     rig = uncalibrated(at_m=5.0)
     rig.forces(5.0, ticks)
     rig.sample.calibrated = True

@@ -261,6 +261,7 @@ def test_a_law_that_cannot_start_cannot_be_armed() -> None:
 
 
 def test_a_law_that_is_armed_before_the_first_tick_is_told_that_the_device_rests() -> None:
+    """T5."""
     told: list[Any] = []
     watching = law(returns(0.0), lambda _state, _params, snapshot: told.append(snapshot))
     Rig(wall(2000.0), module=watching, at_m=-4e-3)

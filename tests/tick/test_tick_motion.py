@@ -91,7 +91,7 @@ def test_a_device_without_velocity_cannot_be_asked_for_it() -> None:
 
 
 def test_an_adaptive_window_that_there_is_no_time_for_is_refused() -> None:
-    """Each sample of it is looked at in every tick."""
+    """C14: each sample of it is looked at in every tick."""
     longest = VelocityConfig(estimator="foaw", samples=64)
     Motion(longest, device("xyz"), 1e-3)
     Motion(longest, device("z"), 1.0 / 4000.0)

@@ -136,7 +136,7 @@ def test_at_any_ratio_of_rates_a_law_settles_what_it_settles_at_the_slower_of_th
 @pytest.mark.parametrize("kind", ["has_clock", "has_sequence"])
 @pytest.mark.parametrize(("loop_steps", "sensor_steps"), [(8, 8), (1, 8), (2, 8), (3, 8), (8, 3), (8, 2)])
 def test_laws_and_books_are_told_the_time_that_has_passed(loop_steps: int, sensor_steps: int, kind: str) -> None:
-    """At 4 kHz on a 1 kHz device they were told 3.5 s in 2 s."""
+    """C2: at 4 kHz on a 1 kHz device they were told 3.5 s in 2 s."""
     told_s = []
 
     def step(_state: Any, _params: Any, tick: Any) -> float:
@@ -151,7 +151,7 @@ def test_laws_and_books_are_told_the_time_that_has_passed(loop_steps: int, senso
 
 
 def test_cycles_are_counted_and_timed_alike_whatever_the_loop_does_in_between() -> None:
-    """A press and a release a quarter of a second; at 4 kHz on a 1 kHz device a cycle lasted 1.75 times as long."""
+    """C2: a press and a release a quarter of a second; at 4 kHz on a 1 kHz device a cycle lasted 1.75 times as long."""
     module = plugins.law("energy-cycle")
     ledgers = []
     for loop_steps in (8, 4, 2, 1):
@@ -195,7 +195,7 @@ def test_the_books_of_a_ramp_close_also_where_it_runs_between_samples() -> None:
     ],
 )
 def test_a_device_is_frozen_by_the_time_that_it_has_been_silent(loop_hz: float, nominal_hz: float, reads: int) -> None:
-    """Not by ticks: at 8 kHz a device of 250 Hz had that many repeats from the first sample to the next.
+    """C11: not by ticks: at 8 kHz a device of 250 Hz had that many repeats from the first sample to the next.
 
     Half a sample less than twenty of them; a clock's rounding makes it a read more where a read is a fraction of that.
     """
@@ -230,7 +230,7 @@ def test_one_read_without_news_after_a_long_pause_is_no_frozen_device() -> None:
     ids=str,
 )
 def test_no_filter_of_the_user_hides_a_device_that_is_too_fast(velocity: dict[str, Any]) -> None:
-    """3 m/s over 147 mm did not trip a limit of 1 m/s behind a low-pass of 1 Hz."""
+    """C6: 3 m/s over 147 mm did not trip a limit of 1 m/s behind a low-pass of 1 Hz."""
     rig = Rig(
         at_m=0.0,
         velocity=VelocityConfig.model_validate(velocity),
@@ -257,7 +257,7 @@ def test_a_limit_of_speed_that_comes_later_counts_from_where_the_device_is_then(
 
 
 def test_a_wall_that_changes_in_time_comes_in_by_a_ramp_on_a_real_device() -> None:
-    """It stepped by 11.5 N in one tick."""
+    """C7: it stepped by 11.5 N in one tick."""
     rig = pressed(wall(250.0, changes=[{"at_s": 0.02, "stiffness_n_per_m": 6000.0}]))
     forces = rig.forces(-2e-3, 200)
     assert forces[0] == 0.5
@@ -283,6 +283,7 @@ def test_its_time_goes_on_while_ticks_are_missed() -> None:
 
 
 def test_an_armed_device_that_is_not_calibrated_any_more_is_a_fault_though_its_position_is_possible() -> None:
+    """C12: forces went on."""
     rig = pressed()
     rig.sample.calibrated = False
     forces = [4.0, *rig.forces(-2e-3, 12)]

@@ -282,7 +282,7 @@ def test_a_scene_that_comes_during_the_fallback_gets_the_fallback() -> None:
 
 
 def test_a_changed_ramp_reaches_later_ramps() -> None:
-    """Of a release and of a switch alike: 0.2 s, after 0.05 s."""
+    """T4: of a release and of a switch alike: 0.2 s, after 0.05 s."""
     for change in ("release", "stiffer"):
         rig = pressed()
         rig.switch(safety=SafetyConfig(ramp_s=0.2, max_speed_m_per_s=100.0))

@@ -102,6 +102,7 @@ def talk() -> Talk:
 
 
 def test_a_frame_that_comes_again_is_repeated_and_one_that_was_missing_is_late(talk: Talk) -> None:
+    """T9."""
     assert talk.hears(10, 11, 13) == [10, 11, 13]
     assert talk.counts == (1.0, 0.0, 0.0, 0.0)
     assert talk.hears(13, 11, 10) == []
@@ -120,6 +121,7 @@ def test_what_came_long_ago_counts_as_late_and_not_as_repeated(talk: Talk) -> No
 
 
 def test_after_number_zero_numbers_are_in_order_as_after_any_other(talk: Talk) -> None:
+    """T9."""
     assert talk.hears(0, 1, 0, 2) == [0, 1, 2]
     assert talk.counts == (0.0, 0.0, 1.0, 0.0)
 
@@ -136,6 +138,7 @@ def test_half_the_circle_ahead_is_behind(talk: Talk) -> None:
 
 
 def test_what_cannot_be_decoded_is_counted_and_passed_over(talk: Talk) -> None:
+    """T9."""
     other_version = bytes([messages.VERSION + 1]) + state(5)[1:]
     other_type = state(5)[:1] + b"\x7f" + state(5)[2:]
     talk.link.heard.append([other_version, state(6), other_type])
@@ -146,6 +149,7 @@ def test_what_cannot_be_decoded_is_counted_and_passed_over(talk: Talk) -> None:
 
 
 def test_a_state_that_has_not_come_is_waited_for(talk: Talk) -> None:
+    """T9."""
     talk.link.heard.extend([[], [], [state(3)]])
     found = talk.conversation.await_state(5.0)
     assert found is not None

@@ -142,6 +142,7 @@ class Drifting(Handle):
 
 @pytest.mark.parametrize("step_m", [1e-5, -1e-5])
 def test_a_handle_that_moves_by_itself_is_told_in_either_direction(step_m: float) -> None:
+    """T10."""
     with pytest.raises(DeviceFaultError, match="moves by itself"):
         motion.check_sign(drive_of(Drifting(step_m, step_m)))
 
@@ -161,7 +162,7 @@ def test_the_sign_is_told_from_one_direction_where_the_other_is_held(moves_m: tu
 
 
 def test_less_than_half_a_millimetre_tells_no_sign() -> None:
-    """A nudge lasts 0.5 s; 0.45 mm in it is play, and 0.55 mm a motor."""
+    """T10: a nudge lasts 0.5 s; 0.45 mm in it is play, and 0.55 mm a motor."""
     with pytest.raises(DeviceFaultError, match="does not move"):
         motion.check_sign(drive_of(Drifting(0.9e-6, -0.9e-6)))
     motion.check_sign(drive_of(Drifting(1.1e-6, -1.1e-6)))
