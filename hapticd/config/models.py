@@ -36,7 +36,7 @@ class LoopConfig(Table):
         0.5,
         gt=0.0,
         le=1.0,
-        description="share of the period that a tick may compute; 3 ticks of 10 above it fail the law",
+        description="share of the period that laws may compute; 3 ticks of 10 above it fail them",
     )
 
     @property

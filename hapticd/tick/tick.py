@@ -66,6 +66,8 @@ class ControlTick:
         fault_text: what there is to say about it.
         advance: what a loop calls each tick: `step`, or what else a scene needs.
         has_objects: whether the scene has objects in space.
+        law_clock: tells how long this thread has computed [ns]; None: nobody asks how long laws do.
+        law_ns: how long the laws of the last tick computed, where somebody asks [ns].
         ports: what clients drive, in scene order: objects, couplings, forces.
         own_ports: of these the ones that pull by themselves, couplings and forces, and their books.
         has_ports: whether there are ports, or were.
@@ -104,6 +106,8 @@ class ControlTick:
         self.fallback = self.has_objects = self.has_ports = False
         self.fault = 0
         self.fault_text = ""
+        self.law_clock: Callable[[], int] | None = None
+        self.law_ns = 0
         self._last_fault = 0
         self._axes = range(axes)
         self._simulated = info.simulated
@@ -208,6 +212,8 @@ class ControlTick:
                     contacts.append(contact)
                 else:
                     contact.x_m = x_m
+            law_clock = self.law_clock
+            began_ns = 0 if law_clock is None else law_clock()
             try:
                 for contact in contacts:
                     contact.act(periods)
@@ -215,6 +221,8 @@ class ControlTick:
                 raise
             except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
                 self._replace_laws(contact, error, periods)
+            if law_clock is not None:
+                self.law_ns = law_clock() - began_ns
         else:
             contacts = self._active
             for waiting in contacts:

@@ -199,6 +199,8 @@ class SpaceTick(ControlTick):
             if self.nearby.moved_out(x, y, z):
                 self._look_around()
             self.held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
+            law_clock = self.law_clock
+            began_ns = 0 if law_clock is None else law_clock()
             try:
                 for contact in contacts:
                     contact.act(periods)
@@ -210,6 +212,8 @@ class SpaceTick(ControlTick):
                 self._replace_laws((contacts or self._under_law())[0], error, periods)
                 for solid in held:
                     solid.act(periods)
+            if law_clock is not None:
+                self.law_ns = law_clock() - began_ns
         else:
             contacts = self._active
             held = self.held
