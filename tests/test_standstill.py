@@ -42,7 +42,9 @@ def test_after(daemon):
     assert daemon == len(Path(__file__).with_name("runs").read_text())
 """
 
-STOOD = "standstill.longest_s = lambda since_s: 0.2"
+STOOD = "standstill.longest_s = lambda since_s, kind=0: 0.2 * (kind == 0)"
+CRAWLED = "standstill.longest_s = lambda since_s, kind=0: 2e-4 * (kind == 1)"
+NEITHER = "standstill.longest_s = lambda since_s, kind=0: 0.0"
 
 
 def may_be_realtime() -> bool:
@@ -53,6 +55,22 @@ def may_be_realtime() -> bool:
 def witness_pids() -> list[int]:
     children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
     return [int(pid) for pid in children if b"SCHED_FIFO" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def test_a_witness_whose_computation_crawls_tells_for_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where any takes too long: it tells of all of them, with their times, and not as standstills."""
+    monkeypatch.setitem(os.environ, "HAPTICD_TESTS_STANDSTILLS", "")
+    monkeypatch.setattr(standstill, "_WITNESS", standstill._WITNESS.replace(str(standstill.CRAWL_S), "0.0"))
+    with standstill.witnesses():
+        began_s = time.monotonic()
+        if not may_be_realtime():
+            assert standstill.excuse(began_s - 1.0) == ""
+            return
+        wait_until(lambda: standstill.longest_s(began_s, 1) > 0.0, "a computation")
+        assert 1e-7 < standstill.longest_s(began_s, 1) < 0.01
+        assert standstill.longest_s(time.monotonic() + 1.0, 1) == 0.0
+        if not standstill.longest_s(began_s):
+            assert "us what takes" in standstill.excuse(began_s)
 
 
 def test_a_witness_that_got_no_processor_tells_for_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,8 +90,10 @@ def test_a_witness_that_got_no_processor_tells_for_how_long(monkeypatch: pytest.
         assert standstill.longest_s(time.monotonic() + 1.0) == 0.0
 
 
-@pytest.mark.parametrize(("during", "runs", "code"), [("pass", 1, 1), (STOOD, 2, 0)])
-def test_what_fails_runs_again_only_after_a_standstill(tmp_path: Path, during: str, runs: int, code: int) -> None:
+@pytest.mark.parametrize(("during", "runs", "code"), [(NEITHER, 1, 1), (STOOD, 2, 0), (CRAWLED, 2, 0)])
+def test_what_fails_runs_again_only_where_the_computer_stood_still_or_crawled(
+    tmp_path: Path, during: str, runs: int, code: int
+) -> None:
     """And then with another daemon, which those after it have too: the one before has ended."""
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_it.py").write_text(TEST.format(during=during))

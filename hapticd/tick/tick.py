@@ -213,7 +213,8 @@ class ControlTick:
                 else:
                     contact.x_m = x_m
             law_clock = self.law_clock
-            began_ns = 0 if law_clock is None else law_clock()
+            if law_clock is not None:
+                self.law_ns = -law_clock()
             try:
                 for contact in contacts:
                     contact.act(periods)
@@ -222,7 +223,7 @@ class ControlTick:
             except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
                 self._replace_laws(contact, error, periods)
             if law_clock is not None:
-                self.law_ns = law_clock() - began_ns
+                self.law_ns += law_clock()
         else:
             contacts = self._active
             for waiting in contacts:

@@ -200,7 +200,8 @@ class SpaceTick(ControlTick):
                 self._look_around()
             self.held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
             law_clock = self.law_clock
-            began_ns = 0 if law_clock is None else law_clock()
+            if law_clock is not None:
+                self.law_ns = -law_clock()
             try:
                 for contact in contacts:
                     contact.act(periods)
@@ -213,7 +214,7 @@ class SpaceTick(ControlTick):
                 for solid in held:
                     solid.act(periods)
             if law_clock is not None:
-                self.law_ns = law_clock() - began_ns
+                self.law_ns += law_clock()
         else:
             contacts = self._active
             held = self.held
