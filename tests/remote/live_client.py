@@ -6,6 +6,7 @@ time that a busy computer took is as it was, and what is left is what the law ma
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import time
 from bisect import bisect_right
@@ -16,10 +17,10 @@ import zmq
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.plugin_tables import RemoteLawTable
-from hapticd.config.ports import port_limits
+from hapticd.config.ports import PortLimits, port_limits
 from hapticd.offline.outcome import Balance, Criterion, Outcome
 from hapticd.offline.rehearsal import Rehearsal, simulation_options
-from hapticd.remote.message import examine, merge
+from hapticd.remote.message import WrongMessageError, examine, merge
 from hapticd.tick.remote.streamed_force import LET_GO_S
 from hapticd.tick.remote.update import FORCE, POSITION, VELOCITY, Update
 from hapticd_studies.law_spec import parse_laws
@@ -191,7 +192,7 @@ def _under(session: Session, law: str) -> Outcome:
         while len(said) < len(came) and came[len(said)].after <= tick:
             step = came[len(said)]
             simulator.step(step.passed_s, step.span_s, known[step.saw])
-            merge(examine({"name": PORT, "seq": len(said), **_fields(simulator.update)}, limits, 1), sent)
+            _take(sent, limits, len(said), _fields(simulator.update))
             said.append(_copy(sent))
         if tick + 1 in heard and heard[tick + 1] < len(said):
             port.take(said[heard[tick + 1]])
@@ -279,9 +280,15 @@ def _said(session: Session) -> list[Update]:
     limits = port_limits(session.config.config.scene)[0]
     update, found = Update(), []
     for number, step in enumerate(session.steps):
-        merge(examine({"name": PORT, "seq": number, **step.fields}, limits, 1), update)
+        _take(update, limits, number, step.fields)
         found.append(_copy(update))
     return found
+
+
+def _take(update: Update, limits: PortLimits, number: int, fields: dict[str, list[float]]) -> None:
+    """What the daemon does with a message: a simulator that goes astray says places that it refuses."""
+    with contextlib.suppress(WrongMessageError):
+        merge(examine({"name": PORT, "seq": number, **fields}, limits, 1), update)
 
 
 def _copy(update: Update) -> Update:
