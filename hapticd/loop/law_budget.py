@@ -8,7 +8,8 @@ BUDGET_MISSES = 3
 
 How long it computed is a question to the system, which costs more than a small law. It is asked from the first tick on
 that took longer, for whatever reason, and until `BUDGET_TICKS` in a row did not. What else a tick does is not the
-law's: a computer that is slow for some milliseconds is so for all of the tick, and a law is a tenth of it.
+law's: a computer that is slow for some milliseconds is so for all of the tick. So a law is to blame only where it
+computed for longer than the tick took besides.
 """
 
 _ALL_TICKS = (1 << BUDGET_TICKS) - 1
@@ -39,6 +40,6 @@ class LawBudget:
             law_ns: processor time of its laws; 0 where nobody asked [ns].
         """
         self.watched = BUDGET_TICKS if took_ns > self._budget_ns else self.watched - 1
-        over = law_ns > self._budget_ns
+        over = law_ns > self._budget_ns and law_ns > took_ns - law_ns
         self._misses = (self._misses << 1 | over) & _ALL_TICKS
         return over and self._misses.bit_count() >= BUDGET_MISSES
