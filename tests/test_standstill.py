@@ -67,7 +67,7 @@ def test_a_witness_whose_computation_crawls_tells_for_how_long(monkeypatch: pyte
             assert standstill.excuse(began_s - 1.0) == ""
             return
         wait_until(lambda: standstill.longest_s(began_s, 1) > 0.0, "a computation")
-        assert 1e-7 < standstill.longest_s(began_s, 1) < 0.01
+        assert 1e-7 < standstill.longest_s(began_s, 1) < 1.0, "a duration, and no point in time"
         assert standstill.longest_s(time.monotonic() + 1.0, 1) == 0.0
         if not standstill.longest_s(began_s):
             assert "us what takes" in standstill.excuse(began_s)

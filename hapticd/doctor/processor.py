@@ -26,17 +26,17 @@ def architecture(machine: str | None = None, largest: int = sys.maxsize) -> Find
         largest: length that this Python can count to, which tells how many bits it has.
     """
     machine = machine or platform.machine()
-    if machine in _ORDERED and largest < 1 << 32:
+    if machine not in _ORDERED:
+        return problem(
+            f"{machine}: the ring between the two processes is safe on 64-bit x86 only, so no daemon starts here",
+            "# use a computer with a 64-bit x86 processor",
+        )
+    if largest < 1 << 32:
         return problem(
             "a Python of 32 bits: it stores a word of the ring in two goes, so the daemon does not start with it",
             "# install hapticd with a 64-bit Python",
         )
-    if machine in _ORDERED:
-        return ok(f"{machine}: stores stay in order, as the shared ring needs it")
-    return problem(
-        f"{machine}: the ring between the two processes is safe on 64-bit x86 only, so the daemon does not start here",
-        "# use a computer with a 64-bit x86 processor",
-    )
+    return ok(f"{machine}: stores stay in order, as the shared ring needs it")
 
 
 def count(loop: LoopConfig, root: Path = ROOT, usable: set[int] | None = None) -> Finding:

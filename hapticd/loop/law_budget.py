@@ -37,7 +37,7 @@ class LawBudget:
 
         Args:
             took_ns: from waking up until now [ns].
-            law_ns: processor time of its laws; 0 where nobody asked [ns].
+            law_ns: processor time of its laws; 0 where it was not measured [ns].
         """
         self.watched = BUDGET_TICKS if took_ns > self._budget_ns else self.watched - 1
         over = law_ns > self._budget_ns and law_ns > took_ns - law_ns

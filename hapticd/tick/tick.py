@@ -66,8 +66,8 @@ class ControlTick:
         fault_text: what there is to say about it.
         advance: what a loop calls each tick: `step`, or what else a scene needs.
         has_objects: whether the scene has objects in space.
-        law_clock: tells how long this thread has computed [ns]; None: nobody asks how long laws do.
-        law_ns: how long the laws of the last tick computed, where somebody asks [ns].
+        law_clock: reads the processor time of this thread [ns]; None: laws are not timed.
+        law_ns: processor time of the laws of the last tick, where they are timed [ns].
         ports: what clients drive, in scene order: objects, couplings, forces.
         own_ports: of these the ones that pull by themselves, couplings and forces, and their books.
         has_ports: whether there are ports, or were.

@@ -134,7 +134,7 @@ def test_a_flood_that_never_becomes_a_message_does_not_keep_a_processor_at_real_
     over = threading.Event()
 
     def ping(raw: socket.socket) -> None:
-        with contextlib.suppress(PermissionError):  # one that other programs keep waiting floods nobody
+        with contextlib.suppress(PermissionError):  # senders that get no processor time are no flood
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), -10)
         with contextlib.suppress(OSError):
             while not over.is_set():

@@ -398,7 +398,7 @@ def test_a_processor_that_reorders_or_tears_stores_is_refused(monkeypatch: pytes
 
 
 def test_a_python_of_32_bits_is_refused_on_any_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
-    """C14: under a 64-bit kernel it is told x86_64, and would store half a word at a time."""
+    """C14: a 64-bit kernel tells it x86_64 as well, but it stores a word in two halves."""
     monkeypatch.setattr("sys.maxsize", 2**31 - 1)
     with pytest.raises(HapticdError, match="64-bit Python"):
         SharedMemory(LAYOUT, RATE_HZ)

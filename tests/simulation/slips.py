@@ -48,7 +48,7 @@ APART = {
         "self._see_again()": "after a position that was not possible the kernel has ended",
         "if not seen or sight.gain > 0.0:": "the same",
         "if self.leaving:": "walls that are gone: the kernel's stays",
-        "if law_clock is not None:": "nobody asks how long laws compute; tests/tick/test_law_time.py",
+        "if law_clock is not None:": "laws are not timed in a simulation; tests/tick/test_law_time.py",
         "except KeyboardInterrupt:": "nobody presses Ctrl-C",
     },
     "Motion.see": {

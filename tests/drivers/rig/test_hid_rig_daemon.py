@@ -130,7 +130,7 @@ def test_a_wall_holds_the_hand_and_the_rig_agrees_where(double: HidDouble, daemo
                     # The law brakes what is left of the motion: one force alone is not yet the balance.
                     looks = [double.look() for _ in range(LOOKS)]
                     for _ in islice(ticks_of(subscriber, faults), HELD_TICKS):
-                        pass  # a fault during the looks is told by then
+                        pass  # the event of a fault during the looks has come by then
                     if not faults:
                         assert median(look.x_m for look in looks) == pytest.approx(-DEPTH_M, rel=0.15)
                         assert median(look.force_un for look in looks) == pytest.approx(1e6 * PRESS_N, rel=0.15)
