@@ -17,7 +17,16 @@ _LOOK_EVERY = 25
 
 
 class DisturbedError(Exception):
-    """The loop let go: this computer had no time for it, or for the device's double."""
+    """The loop let go: this computer had no time for it, or for the device's double.
+
+    Args:
+        text: of the fault.
+        code: of it; None where it had come before.
+    """
+
+    def __init__(self, text: str, code: int | None = None) -> None:
+        super().__init__(text)
+        self.code = code
 
 
 @dataclass(frozen=True)
@@ -55,7 +64,7 @@ def calmest(endpoint: str, ticks: int, still_m: float) -> Rest:
         seen = 0
         for topic, fields in subscriber.maps():
             if topic == "hapticd/event" and 200 <= fields["code"] < 300:
-                raise DisturbedError(str(fields["text"]))
+                raise DisturbedError(str(fields["text"]), fields["code"])
             if topic != "hapticd/position":
                 continue
             window.append(fields["position_m"][0])
@@ -72,4 +81,5 @@ def calmest(endpoint: str, ticks: int, still_m: float) -> Rest:
 
 
 def _grown(before: dict[str, float], after: dict[str, float]) -> str:
-    return ", ".join(f"{name}: {before[name]} to {after[name]}" for name in DISTURBANCES if after[name] > before[name])
+    counted = [name for name in DISTURBANCES if name in after]
+    return ", ".join(f"{name}: {before[name]} to {after[name]}" for name in counted if after[name] > before[name])

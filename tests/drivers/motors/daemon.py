@@ -15,13 +15,14 @@ from hapticd.tick.event import EventCode
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
 from tests.daemon.test_commands import ask
 from tests.drivers.motors.bench import Bench
+from tests.drivers.resting import DisturbedError, Rest, calmest
 
 LIMIT_N_PER_M = 700.0
 """The stiffest wall that these motors hold without a law; 1000 N/m shakes [N/m]."""
 
 PRESS_N = 1.0
 START_M = 0.002
-HELD_TICKS = 1000
+TICKS = 4000
 STILL_M = 2e-5
 BUSY = {
     EventCode.LOOP_LATE,
@@ -72,28 +73,6 @@ def let_go(bench: Bench) -> None:
         shaft.x_m, shaft.v_m_per_s, shaft.hand_n = START_M, 0.0, 0.0
 
 
-def places_m(daemon: Daemon, bench: Bench, ticks: int) -> list[float]:
-    """Where the daemon says that the handle is, in the last of some ticks that nothing has disturbed [m]."""
-    for _ in range(ATTEMPTS):
-        let_go_and_arm(daemon, bench)
-        with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
-            if not subscriber.until("hapticd/status")["armed"]:
-                continue
-            press(bench)
-            found: list[float] = []
-            for topic, fields in subscriber.maps():
-                if topic == "hapticd/event" and 200 <= fields["code"] < 300:
-                    assert fields["code"] in BUSY, fields
-                    break
-                if topic == "hapticd/position":
-                    found.append(fields["position_m"][0])
-                if topic == "hapticd/status" and len(found) >= ticks:
-                    if fields["armed"]:
-                        return found[-HELD_TICKS:]
-                    break
-    raise AssertionError(f"disturbed {ATTEMPTS} times: {daemon.output()}")
-
-
 def let_go_and_arm(daemon: Daemon, bench: Bench) -> None:
     """As a user would: clear a fault that arming tells of, and arm again."""
     let_go(bench)
@@ -102,10 +81,29 @@ def let_go_and_arm(daemon: Daemon, bench: Bench) -> None:
         assert time.monotonic() < end_s, f"{told.args} was refused: {told.stderr} {daemon.output()}"
 
 
-def holds(daemon: Daemon, bench: Bench, stiffness_n_per_m: float) -> tuple[float, float]:
-    """How far the handle moves to and fro at the end, and where it is beside where the wall should hold it [m]."""
-    found = places_m(daemon, bench, 4 * HELD_TICKS)
-    return max(found) - min(found), sum(found) / len(found) + PRESS_N / stiffness_n_per_m
+def pressed(daemon: Daemon, bench: Bench, still: bool = True) -> Rest:
+    """The calmest half second of a handle that a hand presses into the wall; anew where the loop was disturbed.
+
+    Args:
+        daemon: that is ready.
+        bench: where the motors are.
+        still: whether it is to rest, so that a handle that does not though states came late says nothing.
+    """
+    said = []
+    for _ in range(ATTEMPTS):
+        let_go_and_arm(daemon, bench)
+        press(bench)
+        try:
+            rest = calmest(daemon.endpoint, TICKS, STILL_M)
+        except DisturbedError as disturbed:
+            if disturbed.code not in {None, *BUSY}:
+                raise
+            said.append(str(disturbed))
+            continue
+        if not (still and rest.disturbed):
+            return rest
+        said.append(str(rest))
+    raise AssertionError(f"{said}: {daemon.output()}")
 
 
 def lost_and_found(daemon: Daemon, bench: Bench, plug: Callable[[], Any]) -> str:

@@ -9,7 +9,16 @@ import pytest
 
 from tests.daemon.running import Daemon
 from tests.drivers.motors.bench import Bench
-from tests.drivers.motors.daemon import LIMIT_N_PER_M, STILL_M, config, holds, kill_the_loop, lost_and_found, press
+from tests.drivers.motors.daemon import (
+    LIMIT_N_PER_M,
+    PRESS_N,
+    STILL_M,
+    config,
+    kill_the_loop,
+    lost_and_found,
+    press,
+    pressed,
+)
 
 STIFF_N_PER_M = 3.0 * LIMIT_N_PER_M
 
@@ -44,12 +53,12 @@ class MotorDaemonContract:
         self, bench: Rig, tmp_path: Path, law: str, stiffness_n_per_m: float, still: bool
     ) -> None:
         with Daemon(config(self.device(tmp_path / "port"), stiffness_n_per_m, law)) as daemon:
-            swing_m, off_m = holds(daemon.wait_ready(), bench.bench, stiffness_n_per_m)
-            if still:
-                assert swing_m < STILL_M
-                assert abs(off_m) < 0.1e-3
-            else:
-                assert swing_m > 1e-3
+            rest = pressed(daemon.wait_ready(), bench.bench, still)
+        if still:
+            assert rest.swing_m < STILL_M
+            assert rest.mean_m == pytest.approx(-PRESS_N / stiffness_n_per_m, abs=0.1e-3)
+        else:
+            assert rest.swing_m > 1e-3
 
     def test_sigterm_leaves_no_force(self, bench: Rig, tmp_path: Path) -> None:
         with Daemon(config(self.device(tmp_path / "port"), 500.0)) as daemon:
@@ -69,5 +78,4 @@ class MotorDaemonContract:
     def test_an_adapter_that_is_unplugged_is_lost_and_found_again(self, bench: Rig, tmp_path: Path) -> None:
         with Daemon(config(self.device(tmp_path / "port"), 500.0)) as daemon:
             assert "gone" in lost_and_found(daemon.wait_ready(), bench.bench, bench.plug)
-            swing_m, _ = holds(daemon, bench.bench, 500.0)
-            assert swing_m < STILL_M
+            assert pressed(daemon, bench.bench).swing_m < STILL_M

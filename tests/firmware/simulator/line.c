@@ -15,7 +15,7 @@ static struct {
     int master, slave;
     char link[4096];
     uint8_t in[ROOM], out[ROOM];
-    size_t in_first, in_end, out_end;
+    size_t in_first, in_let, in_end, out_end; /* of what has come, behind in_let waits for its millisecond */
     unsigned long taken, given, frames;
 } line = {.master = -1, .slave = -1};
 
@@ -59,7 +59,7 @@ bool line_has_room(void)
 void line_take(void)
 {
     if (line.in_first == line.in_end) {
-        line.in_first = line.in_end = 0;
+        line.in_first = line.in_let = line.in_end = 0;
     }
     ssize_t got = read(line.master, line.in + line.in_end, ROOM - line.in_end);
     for (ssize_t i = 0; i < got; i++) {
@@ -71,9 +71,20 @@ void line_take(void)
     }
 }
 
+void line_let_frame(void)
+{
+    while (line.in_let < line.in_end && line.in[line.in_let++] != 0) {
+    }
+}
+
+void line_let_all(void)
+{
+    line.in_let = line.in_end;
+}
+
 int line_next(void)
 {
-    return line.in_first < line.in_end ? line.in[line.in_first++] : -1;
+    return line.in_first < line.in_let ? line.in[line.in_first++] : -1;
 }
 
 void line_put(uint8_t byte)

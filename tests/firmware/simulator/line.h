@@ -15,7 +15,11 @@ int line_descriptor(void);
 void line_take(void);
 bool line_has_room(void);
 
-/* The next byte for the rig; -1: none. */
+/* Let the rig hear what has been taken, as far as the end of the next frame, or all of it. */
+void line_let_frame(void);
+void line_let_all(void);
+
+/* The next byte that it may hear; -1: none. */
 int line_next(void);
 
 /* Queue a byte of the rig, and give to the host what is queued. */

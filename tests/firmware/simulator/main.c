@@ -6,7 +6,7 @@
  * WIRING is uno or hapkit.
  * PACE says how simulated time passes:
  *   real     with the clock, but never faster: a machine that is late makes the rig slow, it does not replay
- *   frames   1 ms for each frame from the host; after 0.3 s without one, with the clock
+ *   frames   1 ms for each frame from the host, which is heard when that begins; after 0.3 s without one, with the clock
  *   patient  the same, after 30 s without one
  *   steps    only by the command `run`
  * LINK is a symbolic link to the pty that is there while the rig is plugged in.
@@ -78,8 +78,8 @@ static void take(void)
     }
 }
 
-/* Let time pass: for a part at most, so that somebody looks at the line again. */
-static void live(double us)
+/* Let time pass: for a part at most, so that what the rig says is given. */
+static void live_part(double us)
 {
     for (double end_us = time_us + us; time_us < end_us;) {
         if (!plugged()) {
@@ -101,6 +101,13 @@ static void live(double us)
     }
 }
 
+static void live(double us)
+{
+    for (; us > 0.0; us -= PART_US) {
+        live_part(fmin(us, PART_US));
+    }
+}
+
 /* A pty hands bytes over in its own time: first wait for all that the host says it has written. */
 static void run(double us, unsigned long written)
 {
@@ -111,7 +118,17 @@ static void run(double us, unsigned long written)
     }
     for (; us > 0.0; us -= PART_US) {
         take();
-        live(fmin(us, PART_US));
+        line_let_all();
+        live_part(fmin(us, PART_US));
+    }
+}
+
+/* A host that was late sends many at once: they are heard as if it had not been. */
+static void live_frames(void)
+{
+    for (unsigned long frames = line_frames(); frames > 0; frames--) {
+        line_let_frame();
+        live(FRAME_US);
     }
 }
 
@@ -238,19 +255,16 @@ int main(int argc, char **argv)
         }
         take();
         double real_us = now_us();
-        double due_us = 0.0;
-        if (pace == REAL || real_us - heard_us > (pace == PATIENT ? LONGER_US : PATIENCE_US)) {
-            due_us = fmin(real_us - lived_us, BEHIND_US);
-        }
-        if (pace == FRAMES || pace == PATIENT) {
-            due_us += (double)line_frames() * FRAME_US;
-        }
+        double due_us = fmin(real_us - lived_us, BEHIND_US);
         lived_us = real_us;
-        for (; due_us > 0.0; due_us -= PART_US) {
-            live(fmin(due_us, PART_US));
-            if (pace == REAL) { /* at the pace of frames each begins a millisecond of its own */
-                take();
-            }
+        if (pace == REAL) {
+            run(due_us, 0);
+        } else if (real_us - heard_us > (pace == PATIENT ? LONGER_US : PATIENCE_US)) {
+            line_let_all(); /* what has been heard and is no frame; what comes meanwhile may be one */
+            live(due_us);
+        }
+        if (pace != REAL) {
+            live_frames();
         }
     }
 }

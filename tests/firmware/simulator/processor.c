@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include <simavr/avr_adc.h>
+#include <simavr/avr_extint.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_uart.h>
 #include <simavr/sim_avr.h>
@@ -126,6 +127,10 @@ void processor_switch_on(struct processor *processor)
     processor->resets = 0;
     processor->syncs = 0;
     processor->sync_level = false;
+
+    for (uint8_t external = 0; external < 2; external++) { /* else a pin that is low is looked at in every cycle */
+        avr_extint_set_strict_lvl_trig(avr, external, 0);
+    }
 
     avr_ioctl(avr, AVR_IOCTL_UART_GET_FLAGS('0'), &flags);
     flags &= ~(uint32_t)(AVR_UART_FLAG_POLL_SLEEP | AVR_UART_FLAG_STDIO);
