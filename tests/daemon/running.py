@@ -90,6 +90,19 @@ class Daemon:
             assert self.process.poll() is None, f"the daemon ended before {line}: {self.output()}"
         raise AssertionError(f"no {line} from the daemon: {self.output()}")
 
+    def ask(self, do: str) -> str:
+        """What it refuses a command with; "" when it obeys. As `hapticd` asks, without a program that starts for it."""
+        end_s = time.monotonic() + 4.0 * PATIENCE_S
+        with zmq.Context() as context, context.socket(zmq.DEALER) as control:
+            control.linger = 0
+            control.connect(f"ipc://{self.directory}/run/default/control")
+            control.send(msgpack.packb({"do": do}))
+            while not control.poll(200):
+                assert self.process.poll() is None, f"the daemon ended: {self.output()}"
+                assert time.monotonic() < end_s, f"no answer to {do}: {self.output()}"
+            answer = msgpack.unpackb(control.recv())
+        return "" if answer["ok"] else str(answer["text"])
+
     def output(self) -> str:
         return self.log.read_text()
 

@@ -7,10 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgpack
-import zmq
-
-from tests.daemon.running import PATIENCE_S, Daemon
+from tests.daemon.running import Daemon
 from tests.drivers.forcedimension.bench import Bench
 
 AXES = ("x", "y", "z")
@@ -111,6 +108,7 @@ class Lab:
             self.daemon = Daemon(text)
         finally:
             del os.environ["FAKE_DHD_FILE"]
+        self.ask = self.daemon.ask
 
     def __enter__(self) -> Lab:
         self.daemon.wait_ready()
@@ -123,17 +121,3 @@ class Lab:
         """Its device; a process sees one at a time, so this takes the view away from another lab."""
         self.bench.attach(self.file)
         return self.bench
-
-    def ask(self, do: str) -> str:
-        """What the daemon refuses a command with; "" when it obeys."""
-        context = zmq.Context()
-        socket = context.socket(zmq.DEALER)
-        try:
-            socket.connect(f"ipc://{self.daemon.directory}/run/default/control")
-            socket.send(msgpack.packb({"do": do}))
-            assert socket.poll(int(PATIENCE_S * 1e3)), f"no answer to {do}"
-            answer = msgpack.unpackb(socket.recv())
-        finally:
-            socket.close(0)
-            context.term()
-        return "" if answer["ok"] else str(answer["text"])

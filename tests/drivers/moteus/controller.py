@@ -106,31 +106,48 @@ class MoteusController(Controller):
     def _answer(self, query: list[tuple[int, int]]) -> bytes:
         buffer = io.BytesIO()
         writer = Writer(buffer)
-        found = dict(query)
-        first, last = min(found), max(found)
-        combiner = mp.WriteCombiner(writer, 0x20, first, [found.get(at, mp.IGNORE) for at in range(first, last + 1)])
-        for register in range(first, last + 1):
-            if combiner.maybe_write():
-                self._write(writer, register, found[register])
+        for first, resolutions in _runs(query):
+            combiner = mp.WriteCombiner(writer, 0x20, first, resolutions)
+            for at, resolution in enumerate(resolutions):
+                assert combiner.maybe_write()
+                self._write(writer, first + at, resolution)
         data = buffer.getvalue()
         size = next(size for size in (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64) if size >= len(data))
         return data.ljust(size, b"\x50")
 
     def _write(self, writer: Any, register: int, resolution: int) -> None:
-        counted = round(self.shaft.turns * COUNTS_PER_TURN) / COUNTS_PER_TURN - self._zero
-        turns = counted if self.position is None else self.position
-        values = {
-            Register.POSITION: (writer.write_position, turns),
-            Register.VELOCITY: (writer.write_velocity, self.shaft.turns_per_s),
-            Register.TORQUE: (writer.write_torque, self.torque_n_m),
-            Register.VOLTAGE: (writer.write_voltage, self.voltage_v),
-            Register.TEMPERATURE: (writer.write_temperature, 31.0),
-            Register.MODE: (writer.write_int, self.mode),
-            Register.FAULT: (writer.write_int, self.fault),
-            Register.HOME_STATE: (writer.write_int, self.home_state),
-            Register.FIRMWARE_VERSION: (writer.write_int, 0x010B),
-            Register.MILLISECOND_COUNTER: (writer.write_int, self.milliseconds),
-            **{Register.SERIAL_NUMBER1 + word: (writer.write_int, SERIAL[word]) for word in range(3)},
-        }
-        write, value = values[register]
-        write(value, resolution)
+        match register:
+            case Register.POSITION:
+                counted = round(self.shaft.turns * COUNTS_PER_TURN) / COUNTS_PER_TURN - self._zero
+                writer.write_position(counted if self.position is None else self.position, resolution)
+            case Register.VELOCITY:
+                writer.write_velocity(self.shaft.turns_per_s, resolution)
+            case Register.TORQUE:
+                writer.write_torque(self.torque_n_m, resolution)
+            case Register.VOLTAGE:
+                writer.write_voltage(self.voltage_v, resolution)
+            case Register.TEMPERATURE:
+                writer.write_temperature(31.0, resolution)
+            case _:
+                writer.write_int(self._number(register), resolution)
+
+    def _number(self, register: int) -> float:
+        return {
+            Register.MODE: self.mode,
+            Register.FAULT: self.fault,
+            Register.HOME_STATE: self.home_state,
+            Register.FIRMWARE_VERSION: 0x010B,
+            Register.MILLISECOND_COUNTER: self.milliseconds,
+            **{Register.SERIAL_NUMBER1 + word: SERIAL[word] for word in range(3)},
+        }[register]
+
+
+def _runs(query: list[tuple[int, int]]) -> list[tuple[int, list[int]]]:
+    """First register and resolutions of each run without a gap."""
+    runs: list[tuple[int, list[int]]] = []
+    for register, resolution in sorted(query):
+        if runs and register == runs[-1][0] + len(runs[-1][1]):
+            runs[-1][1].append(resolution)
+        else:
+            runs.append((register, [resolution]))
+    return runs

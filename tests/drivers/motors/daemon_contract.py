@@ -12,6 +12,7 @@ from tests.drivers.motors.bench import Bench
 from tests.drivers.motors.daemon import (
     LIMIT_N_PER_M,
     PRESS_N,
+    SOFT_N_PER_M,
     STILL_M,
     config,
     kill_the_loop,
@@ -47,7 +48,7 @@ class MotorDaemonContract:
 
     @pytest.mark.parametrize(
         ("law", "stiffness_n_per_m", "still"),
-        [("none", LIMIT_N_PER_M, True), ("none", STIFF_N_PER_M, False), ("", STIFF_N_PER_M, True)],
+        [("none", SOFT_N_PER_M, True), ("none", STIFF_N_PER_M, False), ("", STIFF_N_PER_M, True)],
     )
     def test_the_default_law_holds_a_wall_of_three_times_the_limit_and_no_law_does_not(
         self, bench: Rig, tmp_path: Path, law: str, stiffness_n_per_m: float, still: bool
@@ -61,7 +62,7 @@ class MotorDaemonContract:
             assert rest.swing_m > 1e-3
 
     def test_sigterm_leaves_no_force(self, bench: Rig, tmp_path: Path) -> None:
-        with Daemon(config(self.device(tmp_path / "port"), 500.0)) as daemon:
+        with Daemon(config(self.device(tmp_path / "port"), SOFT_N_PER_M)) as daemon:
             daemon.wait_ready()
             press(bench.bench)
             daemon.process.terminate()
@@ -70,12 +71,12 @@ class MotorDaemonContract:
 
     def test_a_loop_that_is_killed_leaves_no_force(self, bench: Rig, tmp_path: Path) -> None:
         """The supervisor's helper takes it, since no time passes for the controller's watchdog here."""
-        with Daemon(config(self.device(tmp_path / "port"), 500.0)) as daemon:
+        with Daemon(config(self.device(tmp_path / "port"), SOFT_N_PER_M)) as daemon:
             kill_the_loop(daemon.wait_ready(), bench.bench)
             assert bench.first.torque_n_m == 0.0
             assert "the device is without force" in daemon.output()
 
     def test_an_adapter_that_is_unplugged_is_lost_and_found_again(self, bench: Rig, tmp_path: Path) -> None:
-        with Daemon(config(self.device(tmp_path / "port"), 500.0)) as daemon:
+        with Daemon(config(self.device(tmp_path / "port"), SOFT_N_PER_M)) as daemon:
             assert "gone" in lost_and_found(daemon.wait_ready(), bench.bench, bench.plug)
             assert pressed(daemon, bench.bench).swing_m < STILL_M

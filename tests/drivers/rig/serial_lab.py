@@ -9,9 +9,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import msgpack
-import zmq
-
 from hapticd.tick.event import EventCode
 from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.firmware.board import Board, Built
@@ -49,7 +46,7 @@ def config(board: Board, homing: str, law: str = "") -> str:
 
 
 class Lab:
-    """A daemon on a board, and its control socket.
+    """A daemon on a board.
 
     Args:
         board: the rig; a hand holds its handle at `HELD_M`.
@@ -61,28 +58,14 @@ class Lab:
         self.board = board
         self.zero_m = HELD_M if homing == "here" else 0.0
         self.daemon = Daemon(config(board, homing, law))
-        self._context = zmq.Context()
-        self._socket = self._context.socket(zmq.DEALER)
+        self.ask = self.daemon.ask
 
     def __enter__(self) -> Lab:
         self.daemon.wait_ready()
-        self._socket.connect(f"ipc://{self.daemon.directory}/run/default/control")
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._socket.close(0)
-        self._context.term()
         self.daemon.__exit__(*exception)
-
-    def ask(self, do: str) -> str:
-        """What the daemon refuses a command with; "" when it obeys."""
-        self._socket.send(msgpack.packb({"do": do}))
-        end_s = time.monotonic() + 4.0 * PATIENCE_S
-        while not self._socket.poll(200):
-            assert self.daemon.process.poll() is None, f"the daemon ended: {self.daemon.output()}"
-            assert time.monotonic() < end_s, f"no answer to {do}: {self.daemon.output()}"
-        answer = msgpack.unpackb(self._socket.recv())
-        return "" if answer["ok"] else str(answer["text"])
 
     def press(self) -> Lab:
         """Calibrate, arm, and let a hand press the handle into the wall; anew where this computer was too busy."""

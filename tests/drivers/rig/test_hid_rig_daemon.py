@@ -16,7 +16,6 @@ import pytest
 
 from hapticd.tick.event import EventCode
 from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
-from tests.daemon.test_commands import ask
 from tests.drivers.resting import DisturbedError, Rest, calmest
 from tests.drivers.rig.device import COUNT_M
 from tests.drivers.rig.hid_bench import SERIAL, HidDouble, build
@@ -102,8 +101,9 @@ def let_go_and_arm(double: HidDouble, daemon: Daemon) -> None:
     double.set("hand_n", 0.0)
     double.set("x_m", START_M)
     end_s = time.monotonic() + PATIENCE_S
-    while any((told := ask(daemon, word)).returncode != 0 for word in ("clear", "arm")):
-        assert time.monotonic() < end_s, f"{told.args} was refused: {told.stderr} {daemon.output()}"
+    while refused := daemon.ask("clear") or daemon.ask("arm"):
+        assert time.monotonic() < end_s, f"{refused}: {daemon.output()}"
+        time.sleep(0.05)
 
 
 def ticks_of(subscriber: Subscriber, faults: list[int]) -> Iterator[tuple[int, float]]:
