@@ -6,7 +6,6 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from tests.daemon.running import Subscriber
-from tests.drivers.urgent import as_urgent
 
 HALF_SECOND = 500
 """Ticks that a handle has to rest for."""
@@ -56,7 +55,7 @@ def calmest(endpoint: str, ticks: int, still_m: float) -> Rest:
     Raises:
         DisturbedError: a fault came, so that the wall did not push all the time.
     """
-    with Subscriber(endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber, as_urgent():
+    with Subscriber(endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
         before = _armed(subscriber)
         best = _calmest(subscriber, ticks, still_m)
         after = _armed(subscriber)

@@ -235,22 +235,27 @@ def test_after_any_garbage_the_second_frame_is_understood(board: Board, garbage:
         assert board.state().motor_n == 0.0
 
 
+def heard(port: serial.Serial, count: int) -> list[messages.Message | None]:
+    """The next messages of a rig that has been asked for so many."""
+    reader = FrameReader()
+    found: list[bytes] = []
+    while len(found) < count:
+        found += reader.feed(port.read(1))
+    return [messages.decode(message) for message in found]
+
+
 def test_at_the_pace_of_frames_a_tick_is_a_millisecond_however_slow_the_host(
     start_board: Callable[[Pace, Kind], Board],
 ) -> None:
     board = start_board("patient", "uno")
     with serial.Serial(str(board.port), 1_000_000, timeout=60.0) as port:
         board.run(5000)
-        reader = FrameReader()
         last = -1
         greeting = framed(messages.hello(0))
         port.write(greeting)
         board.run(1000, len(greeting))  # what it answers takes more than a millisecond
         for tick in range(1, 50):
-            heard: list[bytes] = []
-            while not heard:
-                heard = reader.feed(port.read(1))
-            said = messages.decode(heard[0])
+            said = heard(port, 1)[0]
             assert isinstance(said, messages.State if tick > 1 else messages.Identity)
             assert last < 0 or tick == 2 or 900 < said.time_us - last < 1100
             last = said.time_us
@@ -264,12 +269,8 @@ def test_at_the_pace_of_frames_those_of_a_host_that_was_late_are_heard_a_millise
     board = start_board("patient", "uno")
     with serial.Serial(str(board.port), 1_000_000, timeout=60.0) as port:
         board.run(5000)
-        reader = FrameReader()
         port.write(framed(messages.hello(0)) + b"".join(framed(messages.poll(number, 0)) for number in range(1, 31)))
-        heard: list[bytes] = []
-        while len(heard) < 31:
-            heard += reader.feed(port.read(1))
-        states = [said for said in map(messages.decode, heard) if isinstance(said, messages.State)]
+        states = [said for said in heard(port, 31) if isinstance(said, messages.State)]
     assert [state.echo for state in states] == list(range(1, 31))
     steps_us = [after.time_us - before.time_us for before, after in itertools.pairwise(states)]
     assert min(steps_us) > 900

@@ -24,8 +24,12 @@ SOFT_N_PER_M = 500.0
 
 PRESS_N = 1.0
 START_M = 0.002
-TICKS = 1500
+TICKS = 4000
+"""For as long as a wall at the limit takes to rest: one that shakes is told from one that only rings."""
 STILL_M = 2e-5
+SHAKES_M = 5e-3
+"""What shakes moves at least so far: 8 mm at three times the limit; at the limit late states have it move 2 mm [m]."""
+
 BUSY = {
     EventCode.LOOP_LATE,
     EventCode.DEVICE_FROZEN,

@@ -12,6 +12,7 @@ from tests.drivers.motors.bench import Bench
 from tests.drivers.motors.daemon import (
     LIMIT_N_PER_M,
     PRESS_N,
+    SHAKES_M,
     SOFT_N_PER_M,
     STILL_M,
     config,
@@ -59,7 +60,7 @@ class MotorDaemonContract:
             assert rest.swing_m < STILL_M
             assert rest.mean_m == pytest.approx(-PRESS_N / stiffness_n_per_m, abs=0.1e-3)
         else:
-            assert rest.swing_m > 1e-3
+            assert rest.swing_m > SHAKES_M
 
     def test_sigterm_leaves_no_force(self, bench: Rig, tmp_path: Path) -> None:
         with Daemon(config(self.device(tmp_path / "port"), SOFT_N_PER_M)) as daemon:
