@@ -29,9 +29,11 @@ CRAWL_S = 150e-6
 SLOTS = 256
 """Of each processor, for standstills and for crawling; the oldest is overwritten."""
 
+PLACE = "HAPTICD_TESTS_STANDSTILLS"
+"""Names the witnesses' file in the environment, from which every pytest that a test starts would have its excuses."""
+
 _END_S = 0.3
 _SLOT = struct.Struct("dd")  # when it was seen, on CLOCK_MONOTONIC, and how long it took [s]
-_PLACE = "HAPTICD_TESTS_STANDSTILLS"
 _began_s = time.monotonic()  # when the test before did, of which a daemon for several tests may have ended unseen
 _WITNESS = f"""
 import mmap, os, struct, sys, time
@@ -68,7 +70,7 @@ def witnesses() -> Iterator[None]:
     cpus = sorted(os.sched_getaffinity(0))
     with tempfile.NamedTemporaryFile() as file, contextlib.ExitStack() as stack:
         file.truncate(2 * SLOTS * (max(cpus) + 1) * _SLOT.size)
-        os.environ[_PLACE] = file.name
+        os.environ[PLACE] = file.name
         for cpu in cpus:
             command = [sys.executable, "-S", "-c", _WITNESS, file.name, str(cpu), str(os.getpid())]
             witness = stack.enter_context(subprocess.Popen(command, stderr=subprocess.DEVNULL))
@@ -76,7 +78,7 @@ def witnesses() -> Iterator[None]:
         try:
             yield
         finally:
-            del os.environ[_PLACE]
+            del os.environ[PLACE]
 
 
 def longest_s(since_s: float, kind: int = 0) -> float:
@@ -86,7 +88,7 @@ def longest_s(since_s: float, kind: int = 0) -> float:
         since_s: when to look from [s].
         kind: 0: standstills; 1: what the witness computes at each look, where that crawled.
     """
-    place = os.environ.get(_PLACE)
+    place = os.environ.get(PLACE)
     if place is None:
         return 0.0
     size = SLOTS * _SLOT.size

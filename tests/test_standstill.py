@@ -59,7 +59,7 @@ def witness_pids() -> list[int]:
 
 def test_a_witness_whose_computation_crawls_tells_for_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where any takes too long: it tells of all of them, with their times, and not as standstills."""
-    monkeypatch.setitem(os.environ, "HAPTICD_TESTS_STANDSTILLS", "")
+    monkeypatch.setitem(os.environ, standstill.PLACE, "")
     monkeypatch.setattr(standstill, "_WITNESS", standstill._WITNESS.replace(str(standstill.CRAWL_S), "0.0"))
     with standstill.witnesses():
         began_s = time.monotonic()
@@ -74,7 +74,7 @@ def test_a_witness_whose_computation_crawls_tells_for_how_long(monkeypatch: pyte
 
 
 def test_a_witness_that_got_no_processor_tells_for_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(os.environ, "HAPTICD_TESTS_STANDSTILLS", "")
+    monkeypatch.setitem(os.environ, standstill.PLACE, "")
     with standstill.witnesses():
         began_s = time.monotonic()
         if not may_be_realtime():
