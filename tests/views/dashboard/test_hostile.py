@@ -248,6 +248,9 @@ def test_who_does_not_say_hello_gets_nothing(served: Served, first: str) -> None
 def test_a_viewer_that_never_reads_is_dropped_and_costs_the_others_nothing(served: Served) -> None:
     deaf = socket.create_connection(("127.0.0.1", served.port))
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+    # Behind bytes that its full buffer has dropped, a reset is out of its window and not believed: it asks for another.
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    deaf.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 1)
     try:
         deaf.sendall(
             (
