@@ -64,10 +64,10 @@ class Repeating:
         hook = item.ihook
         hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
         for number in range(self._tally.passes(item.nodeid), self._times):
-            before = _started
+            before, served = _started, _daemon_runs()  # the last of its file may take the daemon of that with it
             # All the way round, so that a time limit is one of each run.
             hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
-            daemon = _started > before or _daemon_runs() or number > 0
+            daemon = served or _started > before or _daemon_runs() or number > 0
             failed = any(report.failed for report in self._reports)
             self._tally.add(item.nodeid, passed=not failed, daemon=daemon)
             if failed:

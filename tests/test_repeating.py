@@ -42,7 +42,7 @@ def note(name):
     return open("runs").read().count(name)
 def start():
     return subprocess.Popen(["sh", "-c", "read line", "hapticd", "run"], stdin=subprocess.PIPE)
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="class")
 def shared():
     with start() as process:
         yield
@@ -54,8 +54,11 @@ def test_with_one():
         os._exit(3)
 def test_with_none():
     note("b")
-def test_with_a_shared_one(shared):
-    note("c")
+class TestShared:
+    def test_with_a_shared_one(self, shared):
+        note("c")
+    def test_with_the_same_one_and_its_end(self, shared):
+        note("e")
 def test_that_fails_at_last():
     with start() as process:
         process.communicate(b"\\n")
@@ -78,10 +81,10 @@ def test_a_stopped_run_goes_on_with_what_has_run_least(tmp_path: Path) -> None:
     (tmp_path / "test_it.py").write_text(TESTS)
     assert runs(tmp_path, "yes")[1] == "<" + 3 * "<a"  # the third was not ended, so it does not count
     said, letters = runs(tmp_path, "no")
-    assert letters == "<<b" + "<" + 5 * "<c" + "<" + 4 * "<d" + "<" + 3 * "<a"
+    assert letters == "<<b" + "<" + 5 * "<c" + "<" + 5 * "<e" + "<" + 4 * "<d" + "<" + 3 * "<a"
     assert "in run 4 of 5" in said
-    assert "3 tests start a daemon" in said
-    assert "2 or more: 2 tests" in said
+    assert "4 tests start a daemon" in said
+    assert "2 or more: 3 tests" in said
     assert "test_it.py::test_that_fails_at_last: 1 times, then passed 0" in said
     said, letters = runs(tmp_path, "no")
     assert letters == "<" + 4 * "<d"  # a test that failed begins anew, and all others have done
