@@ -123,7 +123,7 @@ def _switch(burners: int) -> tuple[float, float]:
                 before = _ticks(daemon, client, round(WATCHED_S * 1e3))
                 config.write_text(CONFIG.format(cpu=cpu, law="benchlab.damped"))
                 asked_ns = time.monotonic_ns()
-                daemon.command("reload", "--wait")
+                daemon.command("reload")
                 during = [at_ns for at_ns in _ticks(daemon, client, None) if at_ns > asked_ns]
     return _longest_ms(before), _longest_ms(during)
 

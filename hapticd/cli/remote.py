@@ -164,17 +164,16 @@ def _call_off(_signal: int, _frame: FrameType | None) -> None:
 
 def reload(
     instance: Instance = DEFAULT_INSTANCE,
-    wait: bool = typer.Option(
-        False, "--wait", help="Wait for the verdict; a refused file is printed and exits with 2."
-    ),
+    wait: Annotated[bool, typer.Option(help="Wait for the verdict; without it, only the daemon's events tell.")] = True,
     connect: Connect = None,
     keys: Keys = None,
 ) -> None:
     """Let a running daemon take its edited file over.
 
     Law, walls, limits and telemetry decimation change between two ticks, without a step in force; a file that cannot
-    be used, or that changes what needs a restart, is refused and changes nothing.
+    be used, or that changes what needs a restart, is refused and changes nothing: every problem is named, and the exit
+    status is 2.
 
-    Example: hapticd reload --wait
+    Example: hapticd reload --instance left
     """
     command("reload", instance, connect=connect, keys=keys, wait=wait)

@@ -73,7 +73,7 @@ def ask(daemon: Daemon, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 def edit(daemon: Daemon, config: str) -> subprocess.CompletedProcess[str]:
     daemon.config.write_text(config)
-    return ask(daemon, "reload", "--wait")
+    return ask(daemon, "reload")
 
 
 def assert_ramped(daemon: Daemon, seq: int) -> None:
@@ -149,10 +149,18 @@ def test_a_file_that_cannot_be_used_changes_nothing_and_names_the_place(
         assert after["armed"]
 
 
+def test_who_does_not_wait_learns_it_from_the_events(daemon: Daemon) -> None:
+    with heard(daemon) as subscriber:
+        daemon.config.write_text("[[[")
+        done = ask(daemon, "reload", "--no-wait")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "line 1" in subscriber.until("hapticd/event", code=EventCode.REFUSED)["text"]
+
+
 def test_a_pipe_in_the_place_of_the_file_is_refused_and_not_waited_for(daemon: Daemon) -> None:
     daemon.config.unlink()
     os.mkfifo(daemon.config)
-    refused = ask(daemon, "reload", "--wait")
+    refused = ask(daemon, "reload")
     assert refused.returncode == 2
     assert "is a pipe or a device" in refused.stderr
     assert ask(daemon, "disarm").returncode == 0

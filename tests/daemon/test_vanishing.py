@@ -17,7 +17,7 @@ def test_a_file_that_cannot_be_looked_at_changes_nothing() -> None:
     with Daemon(PRESSED).wait_ready() as daemon:
         daemon.config.unlink()
         daemon.config.symlink_to("long" * 100)
-        refused = ask(daemon, "reload", "--wait")
+        refused = ask(daemon, "reload")
         assert refused.returncode == 2
         assert "lab.toml: cannot be read: File name too long" in refused.stderr
         assert ask(daemon, "disarm").returncode == 0

@@ -58,7 +58,7 @@ def daemon(lab: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Daemon]:
 def reload(daemon: Daemon, law: str) -> subprocess.Popen[str]:
     daemon.config.write_text(f'{PRESSED}[controller]\nlaw = "mylab.{law}"\n')
     environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
-    return subprocess.Popen([HAPTICD, "reload", "--wait"], env=environment, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen([HAPTICD, "reload"], env=environment, stderr=subprocess.PIPE, text=True)
 
 
 def test_a_law_that_imports_for_ten_seconds_is_waited_for_and_the_watchdog_fed(daemon: Daemon) -> None:
