@@ -43,15 +43,16 @@ def doctor(
     ] = None,
     instance: Annotated[str, typer.Option("--instance", "-i", help="Name of the daemon.")] = DEFAULT_INSTANCE,
     duration: Annotated[
-        float, typer.Option("--duration", min=0.1, max=3600.0, help="How long to measure the loop's lateness [s].")
+        float, typer.Option("--duration", min=0.1, max=3600.0, help="How long to measure the loop [s].")
     ] = 5.0,
     no_latency: Annotated[bool, typer.Option("--no-latency", help="Do not measure it.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Say what keeps this computer from running a good loop.
 
-    Looks at kernel, rights, processors, memory, devices, files and sockets, measures how late a loop wakes, and names
-    the command that mends each finding. Changes nothing. Exits with 1 when there was a problem.
+    Looks at kernel, rights, processors, memory, devices, files and sockets, measures how late a loop wakes and how
+    long its tick computes, and names the command that mends each finding. Changes nothing. Exits with 1 when there was
+    a problem.
 
     Example: hapticd doctor --config /etc/hapticd/hapticd.toml
     """

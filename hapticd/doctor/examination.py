@@ -12,7 +12,7 @@ from hapticd.doctor import configuration, driver, endpoints, kernel, memory, pro
 from hapticd.doctor.attempt import attempt
 from hapticd.doctor.configuration import Wanted
 from hapticd.doctor.finding import Check, Finding, Mark, examine, ok
-from hapticd.doctor.latency import Latency, judge, measure
+from hapticd.doctor.latency import Latency, judge, judge_tick, measure
 from hapticd.doctor.tree import ROOT
 from hapticd.keys.store import KeyDirectory, key_directory
 from hapticd.paths import fault_directory, instance_directories, runtime_directory
@@ -83,7 +83,7 @@ class Examination:
             yield from examine(check)
 
     def measured(self, seconds: float, progress: Callable[[float], None]) -> list[Finding]:
-        """Measure how late a loop wakes.
+        """Measure how late a loop wakes, and how long its tick computes.
 
         Args:
             seconds: how long [s].
@@ -93,10 +93,14 @@ class Examination:
         def look() -> Finding:
             if self._daemon():
                 return ok("not measured: it would delay the running daemon; see hapticd watch")
-            self.latency = measure(self.wanted.loop, seconds, progress, self.root)
+            self.latency = measure(self.wanted.loop, self.wanted.loaded, seconds, progress, self.root)
             return judge(self.latency)
 
-        return examine(Check("latency.loop", "latency", look))
+        found = examine(Check("latency.loop", "latency", look))
+        if self.latency is None:
+            return found
+        latency = self.latency
+        return found + examine(Check("latency.tick", "tick", lambda: judge_tick(latency)))
 
     def _daemon(self) -> int:
         """Process of the daemon that a command would reach, the system's or this user's own; 0 when there is none."""

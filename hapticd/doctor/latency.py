@@ -1,6 +1,6 @@
-"""How late a loop wakes on this computer, and whether that is good enough at the configured rate.
+"""How late a loop wakes on this computer and how long its tick computes, and whether that is good enough at its rate.
 
-Lateness is delay, and delay takes stiffness: a wall of K at period T is passive on a device with damping b while
+Both are delay, and delay takes stiffness: a wall of K at period T is passive on a device with damping b while
 b > K (T/2 + delay) (Colgate), so a loop that is T/10 late has to do with a sixth less stiffness, one at T/2 with half.
 """
 
@@ -11,22 +11,25 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from hapticd.config.loading import LoadedConfig
 from hapticd.config.models import LoopConfig
-from hapticd.doctor.finding import Finding, advice, ok, own_command, problem
+from hapticd.doctor.finding import Finding, advice, ok, own_command, problem, unknown
 from hapticd.doctor.processor import is_virtual
 from hapticd.doctor.tree import ROOT
 from hapticd.errors import HapticdError
 from hapticd.measure import MachineWatch, Quantiles
 from hapticd.telemetry.records import LateHistogram
 
-GOOD_LATE = 0.1
-"""Share of the period that p99 of lateness may take in a good loop."""
-BAD_LATE = 0.5
+GOOD_DELAY = 0.1
+"""Share of the period that p99 of lateness, and that of the tick, may take in a good loop."""
+BAD_DELAY = 0.5
 """Share of the period from which on the loop is a bad one."""
 GOOD_SKIPPED = 0.001
 """Share of deadlines that a good loop may skip."""
@@ -41,13 +44,15 @@ _START_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """How late a child process woke at the daemon's deadlines.
+    """How late a child process woke at the daemon's deadlines, and how long it computed at each.
 
     Attributes:
         rate_hz: of the deadlines [Hz].
         seconds: how long [s].
         realtime: scheduling and memory were as the loop wants them.
         late_us: lateness of the ticks that ran [us].
+        tick_us: how long they computed, without device and telemetry [us].
+        tick_fault: why they did not compute, or not to the end; "" if they did.
         skipped: deadlines that were missed by a whole period.
         histogram: ticks in the bins of `hapticd/status`.
         virtual: the processors are those of a virtual machine.
@@ -60,6 +65,8 @@ class Latency:
     seconds: float
     realtime: bool
     late_us: Quantiles
+    tick_us: Quantiles
+    tick_fault: str
     skipped: int
     histogram: tuple[int, ...]
     virtual: bool
@@ -74,12 +81,17 @@ class Latency:
 
 
 def measure(
-    loop: LoopConfig, seconds: float, progress: Callable[[float], None] = lambda share: None, root: Path = ROOT
+    loop: LoopConfig,
+    config: LoadedConfig | None,
+    seconds: float,
+    progress: Callable[[float], None] = lambda share: None,
+    root: Path = ROOT,
 ) -> Latency:
-    """Let a child sleep to deadlines, with the rights and on the processor that the daemon would have.
+    """Let a child sleep to deadlines and compute, with the rights and on the processor that the daemon would have.
 
     Args:
         loop: rate, priority and processor.
+        config: whose tick it computes, None for none.
         seconds: how long [s].
         progress: called with the share that is done.
         root: the file system of /proc.
@@ -88,9 +100,16 @@ def measure(
         HapticdError: the child did not run.
     """
     machine = MachineWatch()
-    sleeper = [sys.executable, "-P", "-m", "hapticd.doctor.sleeper"]
-    command = [*sleeper, str(os.getpid()), loop.model_dump_json(), str(seconds)]
-    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with tempfile.TemporaryFile("w+") as request:
+        json.dump(_request(loop, config, seconds), request)
+        request.seek(0)
+        child = subprocess.Popen(
+            [sys.executable, "-P", "-m", "hapticd.doctor.sleeper"],
+            stdin=request,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
     started_s = time.monotonic()
     try:
         while True:
@@ -108,7 +127,7 @@ def measure(
         raise HapticdError(
             f"the child that measures failed: {(errors.strip() or str(child.returncode)).splitlines()[-1]}"
         )
-    told = json.loads(output)
+    told = json.loads(output.splitlines()[-1])
     conditions = machine.end()
     late_us = [late_ns * 1e-3 for late_ns in told["late_ns"]]
     histogram = LateHistogram()
@@ -122,6 +141,8 @@ def measure(
         seconds=seconds,
         realtime=told["realtime"],
         late_us=Quantiles.of(late_us),
+        tick_us=Quantiles.of(took_ns * 1e-3 for took_ns in told["took_ns"]),
+        tick_fault=told["fault"],
         skipped=told["skipped"],
         histogram=tuple(histogram.counts),
         virtual=virtual,
@@ -142,10 +163,33 @@ def judge(latency: Latency) -> Finding:
     )
     doubts = _doubts(latency)
     said = "; ".join([figures, *doubts])
-    if share <= GOOD_LATE and latency.skipped_share <= GOOD_SKIPPED:
+    if share <= GOOD_DELAY and latency.skipped_share <= GOOD_SKIPPED:
         return ok(said)
-    worse = problem if share > BAD_LATE or latency.skipped_share > BAD_SKIPPED else advice
-    return worse(said, *_remedies(latency))
+    worse = problem if share > BAD_DELAY or latency.skipped_share > BAD_SKIPPED else advice
+    tell_apart = own_command("bench", "lateness") + "  # tells the loop's own share from the machine's"
+    return worse(said, *_remedies(latency, tell_apart))
+
+
+def judge_tick(latency: Latency) -> Finding:
+    """Whether what this configuration computes in a tick is little enough here."""
+    if latency.tick_fault:
+        return unknown(latency.tick_fault)
+    tick_us = latency.tick_us
+    share = tick_us.p99 * 1e-6 * latency.rate_hz
+    said = (
+        f"computing a tick of this configuration: p99 {tick_us.p99:.0f} us, {share:.1%} of the period; "
+        f"p50 {tick_us.p50:.0f} us, longest {tick_us.max:.0f} us; device and telemetry come on top"
+    )
+    if share <= GOOD_DELAY:
+        return ok(said)
+    tell_apart = own_command("bench", "tick") + "  # tells a slow computer from a scene that is large"
+    return (problem if share > BAD_DELAY else advice)(said, *_remedies(latency, tell_apart))
+
+
+def _request(loop: LoopConfig, config: LoadedConfig | None, seconds: float) -> dict[str, Any]:
+    """What the child is asked for."""
+    read = config and {"text": config.text, "path": str(config.path), "folder": str(config.folder)}
+    return {"parent": os.getpid(), "loop": loop.model_dump(), "seconds": seconds, "config": read}
 
 
 def _doubts(latency: Latency) -> list[str]:
@@ -165,12 +209,12 @@ def _doubts(latency: Latency) -> list[str]:
     return doubts
 
 
-def _remedies(latency: Latency) -> list[str]:
-    """What to do about a late loop."""
+def _remedies(latency: Latency, tell_apart: str) -> list[str]:
+    """What to do about a slow loop; the last resort is to measure more."""
     if not latency.realtime:
         return ["# mend scheduling and memory first, see above"]
     if latency.others > _BUSY or latency.rivals:
         return [own_command("doctor") + "  # once more, with the other programs stopped"]
     if latency.virtual:
         return ["# measure on the computer that has the device, not in a virtual machine"]
-    return [own_command("bench", "lateness") + "  # tells the loop's own share from the machine's"]
+    return [tell_apart]

@@ -64,13 +64,15 @@ SCHEMA: dict[str, Any] = {
             "additionalProperties": False,
             "required": [
                 *("rate_hz", "seconds", "realtime", "late_us", "skipped", "histogram", "virtual", "stolen", "others"),
-                "rivals",
+                *("rivals", "tick_us", "tick_fault"),
             ],
             "properties": {
                 "rate_hz": {"type": "number"},
                 "seconds": {"type": "number"},
                 "realtime": {"type": "boolean"},
                 "late_us": {"type": "object", "required": ["count", "p50", "p99", "p999", "max"]},
+                "tick_us": {"type": "object", "required": ["count", "p50", "p99", "p999", "max"]},
+                "tick_fault": {"const": ""},
                 "skipped": {"type": "integer"},
                 "histogram": {"type": "array", "items": {"type": "integer"}, "minItems": 12, "maxItems": 12},
                 "virtual": {"type": "boolean"},
@@ -128,7 +130,9 @@ def test_the_report_is_for_programs_and_its_shape_is_a_promise(empty: dict[str, 
     latency = report["latency"]
     assert sum(latency["histogram"]) == latency["late_us"]["count"]
     assert latency["seconds"] == 0.5
-    assert {finding["check"] for finding in report["findings"]} >= {"kernel.preemption", "memory.swap", "latency.loop"}
+    assert latency["tick_us"]["count"] == latency["late_us"]["count"]
+    named = {finding["check"] for finding in report["findings"]}
+    assert named >= {"kernel.preemption", "memory.swap", "latency.loop", "latency.tick"}
     for finding in report["findings"]:
         assert finding["mend"] or finding["mark"] in ("ok", "unknown")
 
@@ -136,7 +140,7 @@ def test_the_report_is_for_programs_and_its_shape_is_a_promise(empty: dict[str, 
 def test_without_the_measurement_there_is_none(empty: dict[str, str]) -> None:
     report = reported(doctor("--config", GOOD, "--no-latency", "--json", **empty))
     assert report["latency"] is None
-    assert not any(finding["check"] == "latency.loop" for finding in report["findings"])
+    assert not any(finding["check"].startswith("latency.") for finding in report["findings"])
 
 
 @pytest.mark.skipif(shutil.which("setpriv") is None or os.geteuid() != 0, reason="needs root and util-linux's setpriv")
@@ -243,5 +247,5 @@ def test_a_folded_command_is_still_the_same_command() -> None:
 def test_the_page_names_every_check() -> None:
     page = DOCS.read_text()
     wanted = Wanted.of(Path(GOOD))
-    names = [check.name for check in Examination(wanted, "default").checks()] + ["latency.loop"]
+    names = [check.name for check in Examination(wanted, "default").checks()] + ["latency.loop", "latency.tick"]
     assert not [name for name in names if f"`{name}`" not in page]

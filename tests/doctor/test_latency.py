@@ -1,16 +1,46 @@
-"""What the doctor says of lateness, and that its child measures what it says."""
+"""What the doctor says of lateness and of the tick, and that its child measures what it says."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.models import LoopConfig
-from hapticd.doctor.latency import Latency, judge, measure
+from hapticd.doctor.latency import Latency, judge, judge_tick, measure
 from hapticd.errors import HapticdError
 from hapticd.measure import Quantiles
 from tests.doctor.machine import says
+
+WALL = '[[scene.walls]]\naxis = "x"\nposition_m = 0.0\nstiffness_n_per_m = 1000.0\n'
+
+OwnLaw = Callable[[str], LoadedConfig]
+
+
+@pytest.fixture
+def own_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> OwnLaw:
+    """Makes a configuration with a law of somebody's own, by what its step does."""
+    package = tmp_path / f"lab_{tmp_path.name}"
+    package.mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+
+    def write(step: str) -> LoadedConfig:
+        lines = [
+            "import time",
+            "from hapticd.law import LawParams",
+            "class Params(LawParams): pass",
+            "class State: n: int",
+            "def start(state, params, snapshot): state.n = 0",
+            f"def step(state, params, tick): {step}",
+        ]
+        (package / "law.py").write_text("\n".join(lines) + "\n")
+        return parse(f'{WALL}[controller]\nlaw = "{package.name}.law"\n', "lab.toml")
+
+    return write
 
 
 def measured(
@@ -24,12 +54,16 @@ def measured(
     stolen: float = 0.0,
     others: float = 0.0,
     rivals: tuple[str, ...] = (),
+    tick_p99_us: float = 30.0,
+    tick_fault: str = "",
 ) -> Latency:
     return Latency(
         rate_hz=rate_hz,
         seconds=ticks / rate_hz,
         realtime=realtime,
         late_us=Quantiles(ticks - skipped, p99_us / 2, p99_us, p99_us * 2, p99_us * 3),
+        tick_us=Quantiles(ticks - skipped, tick_p99_us / 2, tick_p99_us, tick_p99_us * 2, tick_p99_us * 3),
+        tick_fault=tick_fault,
         skipped=skipped,
         histogram=(ticks - skipped,),
         virtual=virtual,
@@ -72,21 +106,58 @@ def test_a_short_look_says_so() -> None:
     says(judge(measured(ticks=100)), "ok", "too short")
 
 
+@pytest.mark.parametrize(
+    ("p99_us", "rate_hz", "mark"),
+    [(100.0, 1000.0, "ok"), (101.0, 1000.0, "advice"), (501.0, 1000.0, "problem"), (100.0, 8000.0, "problem")],
+)
+def test_a_tick_is_judged_by_its_share_of_the_period_as_well(p99_us: float, rate_hz: float, mark: str) -> None:
+    latency = measured(tick_p99_us=p99_us, rate_hz=rate_hz)
+    found = says(judge_tick(latency), mark, f"p99 {p99_us:.0f} us")
+    assert judge(latency) == judge(measured(rate_hz=rate_hz))
+    assert ["bench tick" in line for line in found.mend] == [True] * (mark != "ok")
+
+
+def test_of_a_tick_that_stopped_nothing_is_said_but_why() -> None:
+    says(judge_tick(measured(tick_p99_us=900.0, tick_fault="the law raised ValueError")), "unknown", "ValueError")
+
+
 @pytest.mark.parametrize("rate_hz", [200.0, 1000.0])
 def test_every_deadline_was_met_or_skipped(rate_hz: float) -> None:
     shares: list[float] = []
     # A realtime of "required" is what is examined, no reason to stop.
-    found = measure(LoopConfig(rate_hz=rate_hz, realtime="required"), 0.5, shares.append)
+    found = measure(LoopConfig(rate_hz=rate_hz, realtime="required"), parse(WALL, "lab.toml"), 0.5, shares.append)
     deadlines = round(0.5 * rate_hz)
     # The last skip may reach beyond the end.
     assert found.late_us.count <= deadlines <= found.late_us.count + found.skipped
     assert sum(found.histogram) == found.late_us.count
     assert 0.0 < found.late_us.p50 <= found.late_us.p99 <= found.late_us.max
+    assert (found.tick_us.count, found.tick_fault) == (found.late_us.count, "")
+    assert 0.0 < found.tick_us.p50 <= found.tick_us.p99 <= found.tick_us.max
     assert shares == sorted(shares)
     assert shares
+
+
+def test_what_a_law_takes_is_in_the_tick_and_what_it_prints_is_no_answer(own_law: OwnLaw) -> None:
+    found = measure(LoopConfig(), own_law("time.sleep(0.002); print('a law talks'); return tick.contact_n"), 0.2)
+    assert found.tick_us.p50 >= 2000.0
+    assert found.skipped > 2 * found.tick_us.count - 10
+    says(judge_tick(found), "problem", "longest")
+
+
+def test_a_law_that_fails_in_the_tick_is_named(own_law: OwnLaw) -> None:
+    found = measure(LoopConfig(), own_law("raise ValueError('no such mass')"), 0.2)
+    assert found.late_us.count
+    says(judge_tick(found), "unknown", "no such mass")
+
+
+def test_without_a_configuration_the_loop_only_sleeps() -> None:
+    found = measure(LoopConfig(), None, 0.2)
+    assert found.late_us.count
+    assert not found.tick_us.count
+    says(judge_tick(found), "unknown", "the configuration cannot be used")
 
 
 def test_a_child_that_fails_is_reported_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(HapticdError, match="child that measures failed: 1"):
-        measure(LoopConfig(), 0.1)
+        measure(LoopConfig(), None, 0.1)

@@ -175,7 +175,7 @@ LEFT = {
         "hapticd/tick/remote/port_record.py",
     ),
     "how a process is started and scheduled; it has no force by then": (
-        *(f"hapticd/loop/{name}.py" for name in ("process", "realtime", "warm_up")),
+        *(f"hapticd/loop/{name}.py" for name in ("press", "process", "realtime", "warm_up")),
         *(f"hapticd/remote/{name}.py" for name in ("priority", "process", "settings")),
     ),
     "the side of a client, who opens nothing": ("hapticd/keys/client.py",),
