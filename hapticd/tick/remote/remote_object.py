@@ -173,19 +173,19 @@ class RemoteContact(SolidContact):
         self.port.stop()
         self.port.force_n[:] = (0.0, 0.0, 0.0)
 
-    def change(self, solid: Solid, along: list[Channel], limit_n: float, at: Vector) -> None:
+    def change(self, solid: Solid, along: list[Channel], limit_n: float, gain: float, at: Vector) -> None:
         """Go on with another solid in the place of this one, and without force: its shade keeps that."""
         port = self.port
         was = Pose.of(port.follower.at_m, port.turning.now)
-        super().change(solid, along, limit_n, at)
+        super().change(solid, along, limit_n, gain, at)
         self._before_n_per_m = solid.stiffness_n_per_m
         if solid.proxy.pose != was:
             port.turning.now = unit(solid.configs[0].orientation) or port.turning.now
             port.stop(solid.placed[0].pose.position_m)
 
-    def let_go(self, limit_n: float) -> None:
+    def let_go(self, limit_n: float, gain: float) -> None:
         """Be gone: what is left of the force fades out."""
-        super().let_go(limit_n)
+        super().let_go(limit_n, gain)
         self._before_n_per_m = 0.0
         self.port.forget()
 

@@ -131,13 +131,16 @@ class Solid:
     def inherit(self, other: Solid) -> bool:
         """Take the proxy over from a solid of the same name, where this one has moved but is the same shape.
 
+        Of several objects the first must not have moved: seen from there, the others have.
+
         Returns:
             Whether it was; else the proxy must be found anew.
         """
-        if _without_place(self.configs) != _without_place(other.configs):
+        moved = self.placed[0].pose != other.placed[0].pose
+        if _without_place(self.configs) != _without_place(other.configs) or (moved and len(self.placed) > 1):
             return False
         self.proxy = copy(other.proxy)
-        if self.placed[0].pose != other.placed[0].pose:
+        if moved:
             self.proxy.move(self.placed[0].pose)
         return True
 

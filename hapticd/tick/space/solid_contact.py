@@ -132,7 +132,7 @@ class SolidContact:
         """A contact that holds what this one applies and has nothing of its own: it is there to fade out."""
         shade = SolidContact(copy(self.solid), make_law, self.resolution_m)
         shade.solid.proxy = copy(self.solid.proxy)
-        shade.let_go(inf)
+        shade.let_go(inf, 1.0)
         for of, channel in zip(self.channels, shade.channels, strict=False):
             channel.dx, channel.dy, channel.dz = of.dx, of.dy, of.dz
             channel.in_contact, channel.x_m, channel.applied_n = of.in_contact, of.x_m, of.applied_n
@@ -141,8 +141,11 @@ class SolidContact:
         shade.quiet = False
         return shade
 
-    def change(self, solid: Solid, along: list[Channel], limit_n: float, at: Vector) -> None:
+    def change(self, solid: Solid, along: list[Channel], limit_n: float, gain: float, at: Vector) -> None:
         """Go on with another solid in the place of this one, and without force: its shade keeps that.
+
+        A device that it holds stays where it was held. For one that is free nothing is known of the way since the
+        solid was last in reach, and a change is no motion: it begins anew.
 
         What the change does to the spring is the scene's own work.
 
@@ -150,9 +153,10 @@ class SolidContact:
             solid: it.
             along: channels along the surface, where it has friction and the one before had none.
             limit_n: the guard's limit for one contact [N].
+            gain: how much of the force a release has left, 0 to 1.
             at: where the device is [m].
         """
-        stays = solid.inherit(self.solid)
+        stays = solid.inherit(self.solid) and solid.proxy.touching
         self.solid = solid
         if not (solid.rough or solid.creases):
             del self.channels[1:]
@@ -162,12 +166,12 @@ class SolidContact:
         proxy = solid.proxy
         (follow if stays else place)(proxy, proxy.others, proxy.voxels, *at)
         self._stand()
-        self._restore(limit_n)
+        self._restore(limit_n, gain)
 
-    def let_go(self, limit_n: float) -> None:
+    def let_go(self, limit_n: float, gain: float) -> None:
         """Be gone: what is left of the force fades out."""
         self.solid.let_go()
-        self._restore(limit_n)
+        self._restore(limit_n, gain)
         self.leaving = True
 
     def observe(
@@ -378,8 +382,8 @@ class SolidContact:
         if len(self.channels) == 3:
             lay_along(self.channels)
 
-    def _restore(self, limit_n: float) -> None:
+    def _restore(self, limit_n: float, gain: float) -> None:
         """Book what a change of the solid does to its spring."""
-        stored_j = self.solid.stored_j(stretched_m(self.solid.proxy), limit_n) if self.depth_m > 0.0 else 0.0
+        stored_j = gain * self.solid.stored_j(stretched_m(self.solid.proxy), limit_n) if self.depth_m > 0.0 else 0.0
         self.moved_j += stored_j - self.ledger.stored_j
         self.ledger.stored_j = stored_j

@@ -120,6 +120,9 @@ class SpaceTick(ControlTick):
             yield from switch.to_law(make_law)
 
         def start() -> None:
+            if not self.has_objects:  # until now nobody has kept it
+                x, y, z = self.motion.position_m
+                self.at_m = (x, y, z)
             for contact in switch.new:
                 contact.start(*self.at_m)
             self._start_laws(switch.laws)
@@ -277,19 +280,19 @@ class SpaceTick(ControlTick):
 
     def _take_objects(self, switch: SpaceSwitch) -> None:
         """Go on with the objects that have been made ready; nothing can fail from here on."""
-        limit_n = self.guard.limit_n
+        limit_n, gain = self.guard.limit_n, self.guard.gain
         before = _places(self.solids)
         for contact, solid in switch.kept:
             contact.solid.index, contact.solid.members = solid.index, solid.members
         for contact, still in switch.gone:
-            contact.let_go(limit_n)
+            contact.let_go(limit_n, gain)
             self.fading.append(contact)
             for channel, law in still:
                 self._take_law(channel, law)
         for contact, solid, channels in switch.changed:
             if any(channel.applied_n != 0.0 for channel in contact.channels):
                 self._fade(contact)
-            contact.change(solid, channels, limit_n, self.at_m)
+            contact.change(solid, channels, limit_n, gain, self.at_m)
         self.solids = switch.solids
         self.listing += _places(self.solids) != before
 

@@ -335,3 +335,106 @@ def test_what_fades_out_has_no_force_of_its_own_and_is_dropped_when_it_is_gone()
     assert rig.force == (0.0, 0.0, 0.0)
     assert rig.tick.awake == []
     assert rig.unbalanced_j() < 1e-12
+
+
+PLATE = {"size_m": (0.1, 0.1, 0.002)}
+ROUND = ((0.0, 0.0, 0.1), (0.2, 0.0, 0.1), (0.2, 0.0, -0.1), (0.0, 0.0, -0.1))
+
+
+@pytest.mark.parametrize("first", [0.1, 0.01], ids=["never in reach", "in reach before"])
+@pytest.mark.parametrize("remote", [False, True], ids=["still", "remote"])
+@pytest.mark.parametrize(
+    ("shape", "keys"),
+    [("box", PLATE), ("sphere", {"radius_m": 0.03}), ("cylinder", {"radius_m": 0.06, "length_m": 0.004})],
+    ids=["plate", "ball", "disc"],
+)
+def test_a_change_of_an_object_that_the_device_has_passed_round_is_not_felt(
+    shape: str, keys: dict[str, Any], remote: bool, first: float
+) -> None:
+    """The way there was taken for one through the object: the guard's limit, 10 cm away, for as long as it stayed."""
+    rig = Rig(table("it", shape, 5000.0, remote=remote, **keys), "none").start(ROUND[0])
+    rig.to((0.0, 0.0, first + 0.03), 100)
+    for at in ROUND:
+        rig.to(at, 100)
+    rig.switch(table("it", shape, 5500.0, remote=remote, **keys))
+    rig.forces.clear()
+    rig.to(ROUND[-1], 3 * RAMP_TICKS)
+    assert not any(map(any, rig.forces))
+    rig.to((0.0, 0.0, 0.0), 400)
+    assert rig.force[2] < -1.0, "and from where it is now it is felt"
+
+
+@pytest.mark.parametrize("z", [0.02, -0.02])
+def test_an_object_that_a_reload_puts_behind_a_free_device_does_not_hold_it(z: float) -> None:
+    """A change is no motion: nothing has swept over the hand."""
+    rig = Rig(table("plate", "box", **PLATE, position_m=(0.0, 0.0, -z)), "none").start((0.0, 0.0, 0.0))
+    rig.to((0.0, 0.0, 0.001), 20)
+    rig.switch(table("plate", "box", **PLATE, position_m=(0.0, 0.0, z))).forces.clear()
+    rig.to((0.0, 0.0, 0.001), 3 * RAMP_TICKS)
+    assert not any(map(any, rig.forces))
+
+
+@pytest.mark.parametrize("before", ["", ball("far", position_m=(0.5, 0.0, 0.0))], ids=["empty", "another far away"])
+def test_a_new_object_comes_in_by_a_ramp_where_the_device_is_now(before: str) -> None:
+    """Without objects nobody kept where the device is: the first began where it had been armed, 10 N in one tick."""
+    here = (0.0, 0.0, 0.028)
+    rig = Rig(before, "none").start((0.0, 0.0, 0.1)).to(here, 100)
+    rig.switch(before + ball()).forces.clear()
+    rig.to(here, 3 * RAMP_TICKS)
+    steps = [apart(now, last) for last, now in pairwise([(0.0, 0.0, 0.0), *rig.forces])]
+    assert max(steps) <= 2.0 * 12.0 / RAMP_TICKS
+    assert rig.force[2] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("before", ["", ball("far", position_m=(0.5, 0.0, 0.0))], ids=["empty", "another far away"])
+def test_a_new_object_between_where_the_device_was_and_is_does_not_hold_it(before: str) -> None:
+    rig = Rig(before, "none").start((0.0, 0.0, -0.02)).to((0.0, 0.0, 0.02), 100)
+    rig.switch(before + table("plate", "box", **PLATE)).forces.clear()
+    rig.to((0.0, 0.0, 0.02), 3 * RAMP_TICKS)
+    assert not any(map(any, rig.forces))
+
+
+@pytest.mark.parametrize(("first_m", "other_m"), [(0.0, 0.05), (-0.01, 0.04), (0.01, 0.05)])
+def test_objects_of_a_union_are_where_the_file_has_them_whichever_moves(first_m: float, other_m: float) -> None:
+    """Where the first moved, the others went along: they are placed as they are seen from there."""
+
+    def scene(first_m: float, other_m: float) -> str:
+        return ball("first", position_m=(first_m, 0.0, 0.0)) + ball("other", position_m=(other_m, 0.0, 0.0))
+
+    over = [(x, 0.0, 0.0285) for x in (first_m, other_m)]
+    felt = []
+    for begun, then in ((scene(0.0, 0.04), scene(first_m, other_m)), (scene(first_m, other_m), "")):
+        rig = Rig(begun, "none").start((0.0, 0.0, 0.05)).to((0.0, 0.0, 0.035), 30)
+        if then:
+            rig.switch(then)
+        for x, y, z in over:
+            rig.to((x, y, 0.035), 200).to((x, y, z), 200)
+            felt.append(rig.force)
+    assert felt[:2] == [pytest.approx(force, abs=1e-6) for force in felt[2:]]
+    assert all(force[2] > 5.0 for force in felt)
+
+
+def test_a_change_under_a_disarmed_device_is_nobodys_work() -> None:
+    """The books had the spring as if it pushed: 12 mJ a reload."""
+    rig = Rig(ball(), "none")
+    rig.sample.position_m[:] = (0.0, 0.0, 0.035)
+    rig.sample.time_ns = 0
+    rig.tick.start(rig.sample)
+    rig.to((0.0, 0.0, 0.028), 50)
+    for scene in (ball(stiffness=6000.0), ball(stiffness=9000.0), ""):
+        rig.switch(scene).to((0.0, 0.0, 0.028), 5)
+    totals = rig.totals
+    assert (totals.moved_j, totals.ledger.dissipated_j, totals.ledger.generated_j) == (0.0, 0.0, 0.0)
+
+
+def test_a_change_in_a_release_is_booked_by_what_is_left_of_the_force() -> None:
+    rig = pressed(law="none")
+    rig.tick.release()
+    rig.to((0.0, 0.0, 0.0292), 20)
+    gain = rig.tick.guard.gain
+    before_j = rig.totals.moved_j
+    rig.switch(ball(stiffness=9000.0))
+    assert 0.4 < gain < 0.7
+    assert rig.totals.moved_j - before_j == pytest.approx(gain * 0.5 * 4000.0 * 0.0008**2, rel=0.05)
+    rig.to((0.0, 0.0, 0.0292), 100)
+    assert rig.unbalanced_j() < 1e-13
