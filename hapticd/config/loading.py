@@ -128,12 +128,8 @@ def parse(text: str, name: str, folder: Path | None = None) -> LoadedConfig:
     Raises:
         ConfigError: it cannot be used; carries every problem, one line each.
     """
-    data = _toml(text, name)
     problems = Problems(name)
-    for key, number in _too_large(data, (), name):
-        problems.add(key, _WHOLE_NUMBER, number)
-    if problems.lines:
-        raise ConfigError(*problems.lines)
+    data = _table(text, name, problems)
     config = problems.validated(Config, data)
     driver, options = _driver(problems, data)
     law, params = _law(problems, data, "controller", ControllerConfig().law)
@@ -157,6 +153,34 @@ def parse(text: str, name: str, folder: Path | None = None) -> LoadedConfig:
     folder = Path(name).parent if folder is None else folder
     files = _with_files(problems, config, folder)
     return LoadedConfig(files, driver, options, law, params, port_law, port_params, Path(name), text, folder)
+
+
+def parse_keys(text: str, name: str, folder: Path) -> Config:
+    """Check a configuration's own keys alone, as one wants them where its driver or its law is not installed.
+
+    Args:
+        text: TOML.
+        name: what to call it in errors.
+        folder: where files lie that it names without their whole path.
+
+    Raises:
+        ConfigError: they cannot be used; carries every problem, one line each.
+    """
+    problems = Problems(name)
+    config = problems.validated(Config, _table(text, name, problems))
+    if config is None:
+        raise ConfigError(*problems.lines)
+    return _with_files(problems, config, folder)
+
+
+def _table(text: str, name: str, problems: Problems) -> dict[str, Any]:
+    """What a text says, as far as TOML goes."""
+    data = _toml(text, name)
+    for key, number in _too_large(data, (), name):
+        problems.add(key, _WHOLE_NUMBER, number)
+    if problems.lines:
+        raise ConfigError(*problems.lines)
+    return data
 
 
 def _toml(text: str, name: str) -> dict[str, Any]:

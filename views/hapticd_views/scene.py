@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from hapticd.config.loading import LoadedConfig, load
+from hapticd.config.loading import load
+from hapticd.config.models import Config
 from hapticd.errors import ConfigError
 from hapticd.figures.space import views
 from hapticd.shapes.proxy import follow, place
@@ -46,32 +47,30 @@ def scene(source: Source, file: Path, config: Path | None, from_s: float, to_s: 
     if not shown.any():
         raise ConfigError(f"{source.name}: no tick from {from_s:g} s to {to_s:g} s")
     if config is not None:
-        loaded = load(config)
+        keys = load(config).config
     elif source.recording is not None:
-        loaded, first = _in_force(source.recording, shown, time_s)
+        keys, first = _in_force(source.recording, shown, time_s)
         path, shown = path[first:], shown[first:]
     else:
         raise ConfigError(f"{source.name}: which scene? give the configuration that was run: --config FILE")
-    solids = [
-        solid.proxy for solid in at_once(compile_objects(loaded.config.scene.objects, loaded.config.loop.period_s))
-    ]
+    solids = [solid.proxy for solid in at_once(compile_objects(keys.scene.objects, keys.loop.period_s))]
     held = _held(solids, path)
     return views(path[shown], solids, None if held is None else held[shown], title)
 
 
-def _in_force(recording: Recording, shown: npt.NDArray[np.bool_], time_s: Points) -> tuple[LoadedConfig, int]:
+def _in_force(recording: Recording, shown: npt.NDArray[np.bool_], time_s: Points) -> tuple[Config, int]:
     """The configuration of the ticks that are shown, and the first tick that had its objects."""
     in_force = recording.in_force
     rows = np.flatnonzero(shown)
-    config = recording.config_of(recording.receipts[in_force[rows[0]]])
+    keys = recording.keys_of(recording.receipts[in_force[rows[0]]])
     for row in rows[np.flatnonzero(np.diff(in_force[rows]))].tolist():
-        other = recording.config_of(recording.receipts[in_force[row + 1]])
-        if other.config.scene.objects != config.config.scene.objects:
+        other = recording.keys_of(recording.receipts[in_force[row + 1]])
+        if other.scene.objects != keys.scene.objects:
             at_s = 0.5 * (time_s[row] + time_s[row + 1])
             file = recording.path.name
             raise ConfigError(f"{file}: its objects changed at {at_s:.5f} s: draw it with --to or --from then")
     others = np.flatnonzero(in_force[: rows[0]] != in_force[rows[0]])
-    return config, int(others[-1]) + 1 if len(others) else 0
+    return keys, int(others[-1]) + 1 if len(others) else 0
 
 
 def _path(source: Source, file: Path) -> tuple[Points, Points]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hapticd.cli import main
-from hapticd.errors import HapticdError
+from hapticd.errors import ConfigError, HapticdError
 from hapticd.telemetry.records import Cycle, Damping, Energy, Event, Position, Sent
 from hapticd_views.recording import read
 from hapticd_views.recording.file import RecordingFile
@@ -25,14 +25,14 @@ TWO_AXES = Position(BEGAN_S, 0, *4 * ((0.5, 0.25),))
 ONE_WALL = Damping(BEGAN_S, 0, (1.0,), (True,), (0.1,))
 
 
-def written(path: Path, *records: Any, walls: Sequence[int] = (1,)) -> Path:
+def written(path: Path, *records: Any, walls: Sequence[int] = (1,), keys: str = "") -> Path:
     """A recording of these, each in ten ticks, with a receipt for every number of walls."""
     file = RecordingFile(path)
     for number in walls:
         status = dataclasses.replace(
             STATUS, wall_axis=("z",) * number, wall_position_m=(0.0,) * number, wall_stiffness_n_per_m=(1e3,) * number
         )
-        answer = {**ANSWER, **status.as_map(), "config_text": WALL * number}
+        answer = {**ANSWER, **status.as_map(), "config_text": WALL * number + keys}
         file.describe(METADATA, as_texts(make_receipt(status, answer)))
     for seq in range(10):
         for record in records:
@@ -119,3 +119,18 @@ def test_a_wall_that_came_after_the_last_tick_is_there_and_unknown(tmp_path: Pat
     assert np.isnan(recording.wall(1)["damping_n_s_per_m"]).all()
     assert not recording.wall(1)["in_contact"].any()
     assert (recording.wall(0)["damping_n_s_per_m"] == 1.0).all()
+
+
+def test_a_recording_of_a_law_and_a_device_that_are_not_installed_here_is_drawn_all_the_same(tmp_path: Path) -> None:
+    """Which side of a wall is free stands in its configuration, and that was read only where all of it could run."""
+    elsewhere = '[controller]\nlaw = "lab.damper"\n[device]\ndriver = "lab.rig"\n[device.options]\nport = "/dev/rig"\n'
+    path = written(tmp_path / "press.mcap", TWO_AXES, ONE_WALL, keys=elsewhere)
+    recording = read(path)
+    with pytest.raises(ConfigError, match=r"lab\.damper"):
+        _ = recording.config
+    assert recording.wall(0)["x_m"].tolist() == 10 * [0.5]
+    for command, file in (("plot", "press.svg"), ("report", "press.html")):
+        with pytest.raises(SystemExit) as ended:
+            main([command, str(path), "--output", str(tmp_path / file)])
+        assert ended.value.code == 0
+        assert (tmp_path / file).stat().st_size > 1000

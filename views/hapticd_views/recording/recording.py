@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hapticd.config.loading import LoadedConfig, parse
+from hapticd.config.loading import LoadedConfig, parse, parse_keys
+from hapticd.config.models import Config
 from hapticd.errors import HapticdError
 from hapticd.telemetry.records import Cycle, Event
 from hapticd.tick.event import EventCode
@@ -72,10 +73,16 @@ class Recording:
             HapticdError: the recorder could not get it.
             ConfigError: this installation cannot use it, for example for want of a driver.
         """
-        if not receipt["config_text"]:
-            raise HapticdError(f"{self.path}: has no configuration: {receipt['config_missing']}")
-        file = Path(receipt["config_file"])
-        return parse(receipt["config_text"], f"{self.path}: {file.name}", file.parent)
+        return parse(*self._text_of(receipt))
+
+    def keys_of(self, receipt: dict[str, Any]) -> Config:
+        """The same as far as it takes neither driver nor law, which may be installed elsewhere only.
+
+        Raises:
+            HapticdError: the recorder could not get it.
+            ConfigError: this version cannot use it.
+        """
+        return parse_keys(*self._text_of(receipt))
 
     @property
     def missing(self) -> int:
@@ -172,7 +179,7 @@ class Recording:
             if index < len(receipt["wall_axis"]):
                 its, axes = self.in_force == number, receipt["axes"]
                 axis[its] = axes.index(receipt["wall_axis"][index]) if len(axes) > 1 else 0
-                free_side = self.config_of(receipt).config.scene.walls[index].free_side
+                free_side = self.keys_of(receipt).scene.walls[index].free_side
                 outward[its] = 1.0 if free_side == "positive" else -1.0
                 place_m[its] = receipt["wall_position_m"][index]
         found = {"t_s": ticks["timestamp"] - ticks["timestamp"][0]}
@@ -188,6 +195,13 @@ class Recording:
             if name in ticks:
                 found[name] = ticks[name][:, index]
         return found
+
+    def _text_of(self, receipt: dict[str, Any]) -> tuple[str, str, Path]:
+        """The text of a configuration, what errors call it, and where its files lie."""
+        if not receipt["config_text"]:
+            raise HapticdError(f"{self.path}: has no configuration: {receipt['config_missing']}")
+        file = Path(receipt["config_file"])
+        return receipt["config_text"], f"{self.path}: {file.name}", file.parent
 
     def __repr__(self) -> str:
         return (
