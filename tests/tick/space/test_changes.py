@@ -337,7 +337,7 @@ def test_what_fades_out_has_no_force_of_its_own_and_is_dropped_when_it_is_gone()
     assert rig.unbalanced_j() < 1e-12
 
 
-PLATE = {"size_m": (0.1, 0.1, 0.002)}
+PLATE: dict[str, Any] = {"size_m": (0.1, 0.1, 0.002)}
 ROUND = ((0.0, 0.0, 0.1), (0.2, 0.0, 0.1), (0.2, 0.0, -0.1), (0.0, 0.0, -0.1))
 
 
