@@ -6,8 +6,7 @@ from math import sqrt
 
 from hapticd.config.remote import PortLimits
 from hapticd.tick.remote.follower import Follower
-from hapticd.tick.remote.one_port import OnePort
-from hapticd.tick.remote.port_axis import PortAxis
+from hapticd.tick.remote.one_port import OnePort, PortAxis
 from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.ramped import Ramped
 from hapticd.tick.remote.update import DAMPING, POSITION, STIFFNESS, VELOCITY, Update

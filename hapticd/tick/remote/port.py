@@ -9,7 +9,7 @@ from hapticd.tick.remote.update import RELEASED, Update
 __all__ = ["QUIET_S", "Port", "PortState"]
 
 QUIET_S = 1.0
-"""Shortest time between two events about one port [s]."""
+"""Shortest time between two events of one kind about one port [s]."""
 
 
 _HELD, _STALE, _RELEASED = PortState.HELD, PortState.STALE, PortState.RELEASED
@@ -37,7 +37,9 @@ class Port:
     """
 
     __slots__ = (
-        "_said_s",
+        "_back_s",
+        "_silent",
+        "_stale_s",
         "_told",
         "age_s",
         "force_n",
@@ -62,8 +64,9 @@ class Port:
         self.impulse_n_s = [0.0] * axes
         self.target_m = [0.0] * axes
         self.news: PortState | None = None
-        self._said_s = QUIET_S  # since it was last told that it is let go
-        self._told = False
+        self._silent = False  # its client, when it was last heard of
+        self._told = False  # the same, as it was told last
+        self._stale_s = self._back_s = QUIET_S  # since either was told last
 
     @property
     def object_index(self) -> int:
@@ -107,7 +110,7 @@ class Port:
             passed_s: time since the last tick on this computer's clock [s].
         """
         self.age_s += passed_s
-        self._said_s += passed_s
+        self._keep_quiet(passed_s)
         if self.state is _HELD and (self.age_s > self.limits.hold_s or self._hangs(passed_s)):
             self._become(_STALE)
 
@@ -120,14 +123,35 @@ class Port:
         del passed_s
         return False
 
+    @property
+    def _waits_to_tell(self) -> bool:
+        """Whether an event has to wait, or would if there were one now."""
+        return self._stale_s < QUIET_S or self._back_s < QUIET_S
+
+    def _keep_quiet(self, passed_s: float) -> None:
+        """Tell what could not be told before, as soon as enough time has passed since the last event [s]."""
+        self._stale_s += passed_s
+        self._back_s += passed_s
+        if self._silent is not self._told:
+            self._tell()
+
     def _become(self, state: PortState) -> None:
         if state is not _HELD:
             self.seq = -1
-        if state is _STALE and self._said_s >= QUIET_S:
-            self.news = state
-            self._said_s = 0.0
-            self._told = True
-        elif state is _HELD and self._told:
-            self.news = state
-            self._told = False
         self.state = state
+        self._silent = state is _STALE
+        self._tell()
+
+    def _tell(self) -> None:
+        """Tell of a silence, or that one that was told has ended, where that is so now and it is not too soon."""
+        if self.news is not None:  # the loop has yet to take that
+            return
+        if self._silent:
+            if not self._told and self._stale_s >= QUIET_S:
+                self.news = _STALE
+                self._told = True
+                self._stale_s = 0.0
+        elif self._told and self.state is _HELD and self._back_s >= QUIET_S:
+            self.news = _HELD
+            self._told = False
+            self._back_s = 0.0

@@ -9,8 +9,7 @@ from hapticd.config.models import SceneConfig
 from hapticd.config.ports import PortLimits, port_limits
 
 if TYPE_CHECKING:  # who puts a tick together knows them; what has none in its scene never loads them
-    from hapticd.tick.remote.one_port import OnePort
-    from hapticd.tick.remote.port_axis import PortAxis
+    from hapticd.tick.remote.one_port import OnePort, PortAxis
 
 
 class PortArrangement:

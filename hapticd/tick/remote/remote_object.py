@@ -45,8 +45,7 @@ class RemoteObject(Port):
         self.follower = Follower(3, limits.max_speed_m_per_s, limits.hold_s)
         self.turning = Turning(first.orientation, _max_turning(limits, solid), limits.hold_s)
         self.target_m = self.follower.at_m
-        self._stiffness = solid.stiffness_n_per_m
-        self._damping = solid.damping_n_s_per_m
+        self.take_surface(solid)
         self.stop(first.position_m)
 
     @property
@@ -70,13 +69,16 @@ class RemoteObject(Port):
         return self.contact.solid.stiffness_n_per_m, normal.damping_n_s_per_m, normal.felt_mass_kg
 
     def change(self, limits: PortLimits) -> None:
-        """Go on under other limits, and with what they say of the surface until the client says otherwise."""
+        """Go on under other limits, or the same."""
         self.limits = limits
         self.follower.max_speed_m_per_s = limits.max_speed_m_per_s
         self.turning.follower.max_speed_m_per_s = _max_turning(limits, self.contact.solid)
         self.follower.hold_s = self.turning.follower.hold_s = limits.hold_s
-        self._stiffness = self.contact.solid.stiffness_n_per_m
-        self._damping = self.contact.solid.damping_n_s_per_m
+
+    def take_surface(self, solid: Solid) -> None:
+        """Have the surface that a file says until the client says otherwise."""
+        self._stiffness = solid.stiffness_n_per_m
+        self._damping = solid.damping_n_s_per_m
 
     def stop(self, position_m: Vector | None = None) -> None:
         """Stay where it is, or at a place."""
@@ -179,6 +181,7 @@ class RemoteContact(SolidContact):
         was = Pose.of(port.follower.at_m, port.turning.now)
         super().change(solid, along, limit_n, gain, at)
         self._before_n_per_m = solid.stiffness_n_per_m
+        port.take_surface(solid)
         if solid.proxy.pose != was:
             port.turning.now = unit(solid.configs[0].orientation) or port.turning.now
             port.stop(solid.placed[0].pose.position_m)

@@ -13,8 +13,7 @@ from hapticd.tick.space.books import Totals
 
 if TYPE_CHECKING:  # what a scene without couplings and forces never loads, and what is handed over
     from hapticd.tick.motion import Motion
-    from hapticd.tick.remote.one_port import OnePort
-    from hapticd.tick.remote.port_axis import PortAxis
+    from hapticd.tick.remote.one_port import OnePort, PortAxis
 
 MakePort = Callable[[PortLimits, "Motion", float, float], "OnePort"]
 """Makes a coupling or a force: its limits, where the device is, the device's resolution [m], the duration of its ramps

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticd.tick.remote.follower import HASTE_PER_S
+from hapticd.tick.remote.port import PortState
 from hapticd.tick.remote.streamed_force import BLEND_S
 from tests.tick.remote.rig import COUPLING, FORCE_PORT, MOST_N, PERIOD_S, PROMPT, RAMP_S, Rig, apart, length
 
@@ -112,6 +114,56 @@ def test_an_object_goes_no_faster_than_its_limit_and_the_books_balance(
             assert length(rig.force) <= 12.0 * (1.0 + 1e-12)
     assert rig.tick.fault == 0
     assert rig.unbalanced_j() < 1e-9
+
+
+PAUSES = st.lists(
+    st.tuples(st.sampled_from([1, 40, 130, 170, 400, 900, 1300]), st.booleans(), st.integers(0, 9)),
+    min_size=1,
+    max_size=12,
+)
+
+
+@settings(max_examples=8, deadline=None)
+@given(pauses=PAUSES, ends=st.booleans(), apart_ticks=st.sampled_from([1, 5]))
+def test_what_was_told_last_is_true_in_the_end_and_nothing_is_told_more_than_once_a_second(
+    pauses: list[tuple[int, bool, int]], ends: bool, apart_ticks: int
+) -> None:
+    """Of a client that talks and pauses, and in the end talks on or is silent for good."""
+    rig = Rig(COUPLING + FORCE_PORT + BALL, axes="xyz", nominal_rate_hz=1000.0 / apart_ticks)
+    told: dict[str, list[tuple[int, PortState]]] = {port.name: [] for port in rig.ports}
+    n = 0
+
+    def go(ticks: int, talks: bool, released: bool = False) -> None:
+        nonlocal n
+        for _ in range(ticks):
+            n += 1
+            for port in rig.ports:
+                if talks and n % 20 == 0:
+                    rig.say(port.name, position_m=[0.0, 0.0, 1.0], force_n=[0.001 * (n % 400), 0.0, 0.0])
+                elif released:
+                    rig.say(port.name, released=True)
+            rig.repeat() if n % apart_ticks else rig.go(dt_s=apart_ticks * PERIOD_S)
+            for port in rig.ports:
+                if port.news is not None:
+                    told[port.name].append((n, port.news))
+                    port.news = None
+            released = False
+
+    go(100, talks=True)
+    for ticks, talks, number in pauses:
+        go(ticks, talks, released=number == 0)
+    go(100, talks=True)
+    go(1500, talks=not ends)
+    for port in rig.ports:
+        events = told[port.name]
+        assert port.state is (PortState.STALE if ends else PortState.HELD)
+        assert (events[-1][1] if events else PortState.HELD) is port.state
+        for each in (PortState.STALE, PortState.HELD):
+            times = [at for at, state in events if state is each]
+            assert all(later - at >= 1000 - apart_ticks for at, later in pairwise(times))
+        assert [state for _, state in events] == [PortState.STALE, PortState.HELD] * (len(events) // 2) + (
+            [PortState.STALE] if len(events) % 2 else []
+        )
 
 
 @pytest.mark.parametrize(

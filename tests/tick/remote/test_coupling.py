@@ -149,6 +149,135 @@ def test_one_that_flaps_is_told_of_once_a_second() -> None:
     assert events.count(PortState.HELD) <= events.count(PortState.STALE)
 
 
+STALE_AND_BACK = [PortState.STALE, PortState.HELD]
+
+
+def events(rig: Rig, ticks: int, apart_ticks: int = 1) -> list[tuple[int, PortState]]:
+    """What is told in these ticks, and in which of them, on a device whose samples are so far apart."""
+    found = []
+    for n in range(ticks):
+        rig.repeat() if n % apart_ticks else rig.go(dt_s=apart_ticks * PERIOD_S)
+        if (news := told(rig)) is not None:
+            found.append((n, news))
+    return found
+
+
+@pytest.mark.parametrize("apart_ticks", [1, 10])
+def test_a_silence_that_came_too_soon_to_be_told_is_told_a_second_after_the_last_one(apart_ticks: int) -> None:
+    """The last that was heard of a client that had died for good was that it is in force again."""
+    rig = Rig(nominal_rate_hz=1000.0 / apart_ticks)
+    found = []
+    for ticks in (300, 5000):
+        rig.say("tool", position_m=[1e-3])
+        found.append(events(rig, ticks, apart_ticks))
+    first, then = found
+    assert [state for _, state in first] == [PortState.STALE]
+    assert [state for _, state in then] == [PortState.HELD, PortState.STALE]
+    assert 300 + then[1][0] - first[0][0] == pytest.approx(1000, abs=2)
+    assert rig["tool"].state is PortState.STALE
+    assert not any(channel.awake for channel in rig["tool"].channels), "and then it costs nothing"
+
+
+def test_a_silence_that_is_still_to_be_told_is_told_of_a_device_that_was_found_again_too() -> None:
+    rig = Rig()
+    for ticks in (300, 150):
+        rig.say("tool", position_m=[1e-3])
+        states = [state for _, state in events(rig, ticks)]
+    assert states == [PortState.HELD]
+    rig.tick.start(rig.sample)
+    assert rig["tool"].state is PortState.IDLE
+    assert [state for _, state in events(rig, 1500)] == [PortState.STALE]
+
+
+@pytest.mark.parametrize("apart_ticks", [1, 10])
+def test_of_a_client_that_speaks_seldom_each_silence_is_told_at_once(apart_ticks: int) -> None:
+    """A second is one of the loop's, whether anything is in force or not."""
+    rig = Rig(nominal_rate_hz=1000.0 / apart_ticks)
+    rig.say("tool", position_m=[1e-3])
+    events(rig, 1300, apart_ticks)
+    for _ in range(3):
+        rig.say("tool", position_m=[1e-3])
+        back, stale = events(rig, 1300, apart_ticks)
+        assert [back[1], stale[1]] == [PortState.HELD, PortState.STALE]
+        assert back[0] == 0
+        assert stale[0] == pytest.approx(100, abs=2)
+
+
+def test_the_end_of_a_silence_too_is_told_once_a_second_and_only_of_one_who_is_in_force_then() -> None:
+    """Silences of 50 ms, from one that was told 1.05 s before the next is."""
+    for released in (False, True):
+        rig = Rig()
+        found = []
+        at = 0
+        for talks, ticks in ((True, 10), (False, 1050), (True, 10), (False, 150)):
+            for _ in range(ticks):
+                if talks:
+                    rig.say("tool", position_m=[1e-3])
+                found += [(at + n, state) for n, state in events(rig, 1)]
+                at += 1
+        assert [state for _, state in found] == [PortState.STALE, PortState.HELD, PortState.STALE]
+        for n in range(1500):
+            if n < 700 or not released:
+                rig.say("tool", position_m=[1e-3])
+            elif n == 700:
+                rig.say("tool", released=True)
+            found += [(at + n, state) for n, state in events(rig, 1)]
+            at += 1
+        assert len(found) == (3 if released else 4)
+        if not released:
+            assert found[3][0] - found[1][0] == pytest.approx(1000, abs=2)
+
+
+def test_time_goes_on_for_the_end_of_a_silence_after_its_client_has_let_go() -> None:
+    rig = Rig()
+    rig.say("tool", position_m=[1e-3])
+    events(rig, 900)
+    rig.say("tool", position_m=[1e-3])
+    rig.go()
+    assert told(rig) is PortState.HELD
+    rig.say("tool", released=True)
+    rig.go(ticks=5000)
+    found = []
+    for ticks in (150, 50):
+        rig.say("tool", position_m=[1e-3])
+        found += events(rig, ticks)
+    assert found == [(pytest.approx(100, abs=2), PortState.STALE), (0, PortState.HELD)]
+
+
+def test_a_client_of_a_device_that_has_had_nothing_new_since_is_told_of_all_the_same() -> None:
+    rig = Rig(nominal_rate_hz=1.0)
+    rig.say("tool", position_m=[1e-3])
+    rig.repeat(150)
+    assert rig["tool"].asleep
+    assert told(rig) is PortState.STALE
+
+
+def test_a_port_whose_event_is_not_due_yet_asks_no_law_and_pulls_at_nothing() -> None:
+    rig = Rig(axes="xyz")
+    held_at(rig, [1e-3, 0.0, 0.0], 20)
+    rig.go(ticks=200)
+    port = rig["tool"]
+    assert port.asleep
+    for channel in port.channels:
+        channel.law.step = None
+    for n in range(300):
+        assert rig.go([0.01 * math.sin(0.1 * n), 0.0, 0.0]) == [0.0] * 3
+    assert rig.tick.fault == 0
+    assert rig.tick.totals().ledger.stored_j == 0.0
+
+
+def test_who_is_back_before_the_loop_has_told_of_a_silence_is_told_of_after_it() -> None:
+    rig = Rig()
+    held_at(rig, [1e-3], 10)
+    rig.go(ticks=101)
+    found = []
+    for _ in range(3):
+        rig.say("tool", position_m=[1e-3])
+        found.append(told(rig))
+        rig.go()
+    assert found == [*STALE_AND_BACK, None]
+
+
 def test_a_client_that_lets_go_is_no_matter_of_an_event() -> None:
     rig = Rig()
     held_at(rig, [2e-3], 300)
@@ -290,6 +419,50 @@ def test_another_limit_is_gone_over_to_by_the_ramp_however_near_it_is(most_n: fl
     steps = [after - before for before, after in pairwise(forces)]
     assert max(map(abs, steps)) <= 0.8 * PERIOD_S / RAMP_S * (1.0 + 1e-6)
     assert forces[-1] == pytest.approx(most_n)
+
+
+@pytest.mark.parametrize("most_n", [0.5, 2.0 * MOST_N])
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(200, 0), (200, 5000), (20, 100), (RAMP_TICKS - 2, 0), (RAMP_TICKS - 2, 2), (RAMP_TICKS + 2, 0)],
+    ids=["asleep", "long before", "as it goes", "at its last", "at its last and in between", "just gone"],
+)
+def test_who_comes_after_another_limit_was_loaded_comes_under_that_one(before: int, after: int, most_n: float) -> None:
+    """Ticks from where the client before let go until the reload, and from there until the next client."""
+    other = (COUPLING + PROMPT).replace(f"max_force_n = {MOST_N}", f"max_force_n = {most_n}")
+    rig, fresh = Rig(COUPLING + PROMPT), Rig(other)
+    held_at(rig, [2e-3], 100)
+    rig["tool"].take(update(rig.seq, released=True))
+    rig.go(ticks=before)
+    rig.switch(other)
+    rig.go(ticks=after)
+    while rig["tool"].weight:  # what is left of the force of before has a ramp
+        rig.go()
+    forces = comes_in(rig)
+    assert max(map(abs, forces)) <= most_n
+    assert forces == pytest.approx(comes_in(fresh), abs=1e-9)
+    assert forces[-1] == pytest.approx(most_n)
+
+
+def test_who_comes_to_a_device_that_was_found_again_comes_under_the_limit_that_was_loaded_just_before() -> None:
+    other = (COUPLING + PROMPT).replace(f"max_force_n = {MOST_N}", "max_force_n = 0.5")
+    rig = Rig(COUPLING + PROMPT)
+    held_at(rig, [2e-3], 100)
+    rig.switch(other)
+    rig.go(ticks=3)
+    rig.tick.start(rig.sample)
+    rig.force = [0.0]
+    assert comes_in(rig) == pytest.approx(comes_in(Rig(other)), abs=1e-9)
+
+
+def comes_in(rig: Rig) -> list[float]:
+    """The force of a client that comes while the device passes by, faster than its target may be."""
+    forces = []
+    for n in range(200):
+        if n >= 10:
+            rig.say("tool", position_m=[0.08])
+        forces += rig.go([min(4e-3 * n, 0.06)])
+    return forces
 
 
 @pytest.mark.parametrize("axes", ["x", "xyz"])

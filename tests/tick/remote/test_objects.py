@@ -10,7 +10,7 @@ import pytest
 
 from hapticd.tick.remote.port import PortState
 from hapticd.tick.space.tick import SpaceTick
-from tests.tick.remote.rig import MOST_N, PERIOD_S, RAMP_S, Hand, Rig, length
+from tests.tick.remote.rig import MOST_N, PERIOD_S, RAMP_S, WALL, Hand, Rig, length
 
 PLANE = """
 [[scene.objects]]
@@ -221,6 +221,17 @@ def test_stiffness_goes_over_by_a_ramp_and_is_the_clients_work() -> None:
     assert was_n == pytest.approx(0.5)
     assert rig.tick.totals().moved_j == pytest.approx(-0.5 * 1500.0 * 1e-6, rel=1e-6)
     assert rig.unbalanced_j() < 1e-9
+
+
+def test_stiffness_goes_where_its_client_said_through_a_reload_of_something_else() -> None:
+    """It stopped on its way."""
+    rig = Rig(BALL, axes="xyz")
+    rig.say("ball", stiffness_n_per_m=500.0, damping_n_s_per_m=0.0)
+    rig.go([0.0, 0.0, -0.021], ticks=20)
+    rig.switch(BALL + WALL.replace("position_m = 0.0", "position_m = -0.5"))
+    assert rig.go(ticks=100) == pytest.approx([0.0, 0.0, 0.5])
+    rig.switch(BALL.replace("2000.0", "1000.0"))
+    assert rig.go(ticks=100) == pytest.approx([0.0, 0.0, 1.0])
 
 
 def test_stiffness_that_changes_where_nothing_is_touched_is_no_work() -> None:
