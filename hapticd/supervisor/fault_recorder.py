@@ -78,6 +78,8 @@ class FaultRecorder:
                 self._waiting.append(_Job(self._store, event, epoch_s, shared, rate_hz, header))
             except OSError as error:  # no more files or memory to be had: no reason to end
                 self._problem = f"fault record not written: {_why(error)}"
+        else:
+            self._problem = f"fault record not written: {_MOST_WAITING} others are still to be written"
 
     def turn(self, keep: int) -> str:
         """Start what is due; returns at once. What went wrong with a record that is done, "" when nothing did.

@@ -64,6 +64,7 @@ class ControlTick:
         requested_n: what the laws asked for [N].
         fault: code of a fault raised by the last tick, 0 when there was none; the loop takes and clears it.
         fault_text: what there is to say about it.
+        just_armed: no tick has come since, and ramps begin with the next one.
         advance: what a loop calls each tick: `step`, or what else a scene needs.
         has_objects: whether the scene has objects in space.
         law_clock: reads the processor time of this thread [ns]; None: laws are not timed.
@@ -106,6 +107,7 @@ class ControlTick:
         self.fallback = self.has_objects = self.has_ports = False
         self.fault = 0
         self.fault_text = ""
+        self.just_armed = False
         self.law_clock: Callable[[], int] | None = None
         self.law_ns = 0
         self._last_fault = 0
@@ -176,6 +178,10 @@ class ControlTick:
         if not self._simulated:
             passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
             periods = passed_s / self.period_s
+            if self.just_armed:
+                self.just_armed = False
+                if periods > 1.0:  # enabling the device took that, without force
+                    passed_s, periods = self.period_s, 1.0
         seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
             self._change_walls(periods)
@@ -256,6 +262,7 @@ class ControlTick:
         laws = self._start_laws(fresh)
         self.guard.arm()
         self.fallback = False
+        self.just_armed = True
         for contact, law in laws:
             self._take_law(contact, law)
         for contact in self._fading_out():

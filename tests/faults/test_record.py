@@ -219,6 +219,21 @@ def test_a_record_waits_for_the_ticks_after_the_fault(tmp_path: Path) -> None:
     shared.close()
 
 
+def test_a_fault_for_which_there_is_no_room_beside_those_that_wait_is_told(tmp_path: Path) -> None:
+    """The fifth in a second had no record, and nothing said so."""
+    shared = SharedMemory(LAYOUT, RATE_HZ)
+    extend(shared, 100, 0)
+    recorder = FaultRecorder(tmp_path)
+    told = []
+    for at in range(6):
+        recorder.begin(LoopEvent(EventCode.OVER_SPEED, "too fast", 50 + at, 0), 1e9 + at, shared, RATE_HZ, header())
+        told.append(recorder.turn(9))
+    shared.close()
+    assert told == [*4 * [""], *2 * ["fault record not written: 4 others are still to be written"]]
+    assert recorder.close(9, 10.0) == ""
+    assert recorder.written == 4
+
+
 def test_a_record_that_cannot_be_written_is_a_line_that_says_why(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("a file is in the way")
     shared = SharedMemory(LAYOUT, RATE_HZ)
@@ -298,8 +313,16 @@ def test_the_command_lists_shows_and_exports(
     assert "position [mm]" in shown
     assert json.loads(hapticd("show", "--json"))["summary"]["ramp_ticks"] == 2
     assert len(hapticd("export").splitlines()) == 25
-    hapticd("export", path.stem, "--output", str(tmp_path / "out.csv"))
-    assert len((tmp_path / "out.csv").read_text().splitlines()) == 25
+    output = tmp_path / "out.csv"
+    assert hapticd("export", path.stem, "--output", str(output)) == f"{output}: 24 rows of {path.stem}\n"
+    assert len(output.read_text().splitlines()) == 25
+    output.write_text("mine")
+    with pytest.raises(SystemExit) as ended:
+        main(["fault", "export", "--output", str(output), "--directory", str(path.parent)])
+    said = f"hapticd: {output}: exists; add --overwrite to replace it\n"
+    assert (ended.value.code, capsys.readouterr().err, output.read_text()) == (2, said, "mine")
+    hapticd("export", "--output", str(output), "--overwrite")
+    assert len(output.read_text().splitlines()) == 25
     monkeypatch.undo()
     time.tzset()
 

@@ -83,6 +83,29 @@ def test_a_force_begins_without_any_deadline_missed(monkeypatch: pytest.MonkeyPa
     assert (EventCode.LOOP_LATE in [event.code for event in started.told]) == (missed == 50)
 
 
+@pytest.mark.parametrize("enable_s", [0.0, 2e-3, 0.02, 0.04, 0.09])
+def test_a_ramp_begins_with_the_first_tick_however_long_the_device_took_to_let_forces_through(
+    monkeypatch: pytest.MonkeyPatch, enable_s: float
+) -> None:
+    """It was counted as the ramp's: 4 N of 10 in the first tick. And from 51 ms on as a force that was held, a 209."""
+    started = Started(Clock(monkeypatch), auto_arm=False)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    driver = started.driver
+    driver.sample.position_m[0] = -0.01
+    written: list[float] = []
+    monkeypatch.setattr(driver, "_enable", lambda: started.clock.pass_s(enable_s))
+    monkeypatch.setattr(driver, "_write", lambda force_n: written.append(force_n[0]))
+
+    def each_tick(number: int) -> None:
+        if number == 5:
+            started.shared.post({"do": "arm"})
+
+    started.run(each_tick, 100)
+    assert written[:51] == pytest.approx([0.2 * tick for tick in range(51)])
+    assert EventCode.LOOP_LATE not in [event.code for event in started.told]
+    assert started.skipped >= int(enable_s * 1e3)
+
+
 def test_an_event_before_the_first_tick_has_the_time_that_it_is(started: Started) -> None:
     """T3."""
     now_ns = started.clock.now_ns

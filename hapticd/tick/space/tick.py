@@ -158,6 +158,10 @@ class SpaceTick(ControlTick):
         if not self._simulated:
             passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
             periods = passed_s / self.period_s
+            if self.just_armed:
+                self.just_armed = False
+                if periods > 1.0:  # enabling the device took that, without force
+                    passed_s, periods = self.period_s, 1.0
         seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
             self._change_walls(periods)
@@ -205,6 +209,7 @@ class SpaceTick(ControlTick):
             law_clock = self.law_clock
             if law_clock is not None:
                 self.law_ns = -law_clock()
+            solid: SolidContact | None = None
             try:
                 for contact in contacts:
                     contact.act(periods)
@@ -213,7 +218,7 @@ class SpaceTick(ControlTick):
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
-                self._replace_laws((contacts or self._under_law())[0], error, periods)
+                self._replace_laws(contact if solid is None else solid.normal, error, periods)
                 for solid in held:
                     solid.act(periods)
             if law_clock is not None:

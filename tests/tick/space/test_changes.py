@@ -16,7 +16,7 @@ from hapticd.law import LawSnapshot
 from hapticd.tick import fallback
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.contact import RunningLaw
-from tests.tick.space import passing_fault
+from tests.tick.space import nonsense, passing_fault
 from tests.tick.space.rig import INFO, Rig, apart, ball, config, length, table
 
 RAMP_TICKS = 50
@@ -263,6 +263,17 @@ def test_a_law_that_fails_on_an_object_is_replaced_and_the_force_let_out() -> No
     rig.to((0.0, 0.0, 0.0291), 60)
     assert rig.force == (0.0, 0.0, 0.0)
     assert loaded.law is not contact.normal.law.module
+
+
+@pytest.mark.parametrize("at", [0, 1], ids=["a wall's", "an object's"])
+def test_the_law_that_failed_is_named_and_no_other(at: int) -> None:
+    """The first contact's was, whichever had failed: the way back is to mend it."""
+    wall = '[[scene.walls]]\naxis = "z"\nstiffness_n_per_m = 100.0\nposition_m = 0.03\n'
+    rig = pressed(wall + ball(), "damper")
+    failing = (rig.tick.contacts[0], rig.tick.solids[0].normal)[at]
+    failing.law = RunningLaw(nonsense, nonsense.Params())
+    rig.go((0.0, 0.0, 0.0291))
+    assert rig.tick.fault_text == "law tests.tick.space.nonsense: ArithmeticError: nan is not a possible number"
 
 
 def test_what_comes_while_the_fallback_is_in_force_has_it_too_until_the_device_is_armed() -> None:
