@@ -7,6 +7,7 @@ process is `python -m hapticd.discovery`: a request on its standard input, the a
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 import os
 import subprocess
@@ -18,7 +19,7 @@ from typing import Any, TypeVar
 
 from hapticd import plugins
 from hapticd.device import Diagnosis, FoundDevice
-from hapticd.driver import DriverOptions
+from hapticd.driver import Driver, DriverOptions
 from hapticd.errors import HapticdError
 
 T = TypeVar("T")
@@ -37,6 +38,7 @@ class Discovery:
         diagnoses: what it says of this computer.
         absent: what to do when it found nothing.
         problem: why the answer is not whole; "" when it is.
+        looks: whether it can look for devices; one without a `find` of its own may drive what is there all the same.
     """
 
     driver: str
@@ -44,6 +46,7 @@ class Discovery:
     diagnoses: tuple[Diagnosis, ...] = ()
     absent: str = ""
     problem: str = ""
+    looks: bool = True
 
 
 def look(
@@ -89,6 +92,7 @@ def _ask(name: str, options: DriverOptions | None, find: bool, timeout_s: float)
         tuple(Diagnosis(**{**one, "mend": tuple(one["mend"])}) for one in said["diagnoses"]),
         said["absent"],
         said["problem"],
+        said["looks"],
     )
 
 
@@ -112,7 +116,8 @@ def _answer(request: Mapping[str, Any]) -> Discovery:
         devices = [_of(FoundDevice, one) for one in driver.find(options)] if request["find"] else []
     except Exception as error:  # noqa: BLE001 - a plug-in is anybody's code
         problems.append(_told(error))
-    return Discovery(name, tuple(devices), tuple(diagnoses), driver.ABSENT, "; ".join(problems))
+    looks = inspect.getattr_static(driver, "find") is not vars(Driver)["find"]
+    return Discovery(name, tuple(devices), tuple(diagnoses), driver.ABSENT, "; ".join(problems), looks)
 
 
 def _of(kind: type[T], one: object) -> T:

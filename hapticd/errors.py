@@ -24,6 +24,7 @@ HapticdError                     one line for the user; `exit_code` for the shel
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import PurePath
 from traceback import walk_tb
 
@@ -118,6 +119,14 @@ class SchemaError(ClientError):
 
 class WireError(ClientError):
     """A message that is not what the contract says."""
+
+
+def alike(name: str, known: Sequence[str]) -> str:
+    """Advice for an unknown name: `did you mean "x"?`, or nothing where none is near."""
+    import difflib  # for an error only
+
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+    return f'did you mean "{near[0]}"?' if near else ""
 
 
 def in_words(error: BaseException, module: str) -> str:

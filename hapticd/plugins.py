@@ -13,7 +13,7 @@ from types import FrameType, ModuleType
 from typing import Any, NoReturn
 
 from hapticd.driver import Driver
-from hapticd.errors import PluginError, in_words
+from hapticd.errors import PluginError, alike, in_words
 from hapticd.law import check_law
 
 DRIVERS = "hapticd.drivers"
@@ -40,10 +40,7 @@ def driver(name: str) -> type[Driver[Any]]:
         return _checked_driver(name, point.value, _load(point))
     if "." in name:
         return _driver_of_module(name)
-    raise PluginError(
-        f"no driver {name!r}: installed are {', '.join(names(DRIVERS)) or 'none'}; one of your own is named with a "
-        "dot, `package.module`"
-    )
+    raise PluginError(_unknown(DRIVERS, "driver", name, "one of your own"))
 
 
 def law(name: str) -> ModuleType:
@@ -58,14 +55,18 @@ def law(name: str) -> ModuleType:
     elif "." in name:
         loaded = _imported("law", name, name)
     else:
-        raise PluginError(
-            f"no law {name!r}: installed are {', '.join(names(CONTROLLERS)) or 'none'}; a module of your own is named "
-            "with a dot, `package.module`"
-        )
+        raise PluginError(_unknown(CONTROLLERS, "law", name, "a module of your own"))
     if not isinstance(loaded, ModuleType):
         raise PluginError(f"law {name}: {loaded!r} is not a module")
     check_law(loaded)
     return loaded
+
+
+def _unknown(group: str, kind: str, name: str, own: str) -> str:
+    """What to say of a name that is not installed."""
+    installed = names(group)
+    listed = f"installed are {', '.join(installed) or 'none'}; {own} is named with a dot, `package.module`"
+    return f"no {kind} {name!r}: " + " ".join(filter(None, (alike(name, installed), listed)))
 
 
 class Interrupted(KeyboardInterrupt):

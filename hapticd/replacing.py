@@ -10,7 +10,7 @@ import errno
 import stat
 from pathlib import Path
 
-from hapticd.errors import HapticdError
+from hapticd.errors import ConfigError, HapticdError
 
 _KINDS = {
     stat.S_IFDIR: "a directory",
@@ -33,6 +33,27 @@ def obstacle(path: Path) -> str:
     except FileNotFoundError:
         return ""
     return "" if stat.S_ISREG(mode) else f"is {_KINDS.get(stat.S_IFMT(mode), 'something else')}, not a file"
+
+
+def place(path: Path, overwrite: bool) -> Path:
+    """Where the output of a command goes: behind a link, what it leads to.
+
+    Args:
+        path: as the user names it.
+        overwrite: whether a file of this name may be replaced.
+
+    Raises:
+        ConfigError: something is there already, or it is no place for a file.
+    """
+    there = path.resolve() if path.is_symlink() else path
+    reason = obstacle(there)
+    if reason:
+        raise ConfigError(f"{there}: {reason}")
+    if there.exists() and not overwrite:
+        raise ConfigError(f"{path}: exists; add --overwrite to replace it")
+    if not there.parent.is_dir():
+        raise ConfigError(f"{path}: there is no directory {there.parent}")
+    return there
 
 
 def put(finished: Path, path: Path) -> None:

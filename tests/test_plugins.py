@@ -67,7 +67,9 @@ def test_every_shipped_law_keeps_the_contract_and_every_driver_loads() -> None:
 
 
 def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:
-    with pytest.raises(PluginError, match=r"no driver 'omega9': installed are .*loopback.*package\.module"):
+    with pytest.raises(
+        PluginError, match=r"no driver 'omega9': did you mean \"omega7\"\? installed are .*loopback.*package\.module"
+    ):
         plugins.driver("omega9")
     with pytest.raises(PluginError, match=r"no law 'magic': installed are .*energy-cycle.*package\.module"):
         plugins.law("magic")

@@ -77,7 +77,9 @@ def _abandon_output() -> None:
 def _usage(error: typer.TyperException) -> str:
     context: Any = getattr(error, "ctx", None)
     path = context.command_path if context else "hapticd"
-    return f"{error.format_message()}\n  see {path} --help"
+    # Typer says what pydantic says, and has a line for each choice.
+    message = error.format_message().replace(": Value error, ", ": ", 1).replace("\n\t", " ")
+    return f"{message}\n  see {path} --help"
 
 
 def _complain(message: str, status: int) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from importlib.metadata import EntryPoint, entry_points
-from typing import Final
+from typing import ClassVar, Final
 
 import typer
 
@@ -48,6 +48,18 @@ The module has a function of the command's name, or `app` when the command has c
 
 GROUP = "hapticd.commands"
 
+_ACT: Final = ("remote", "run", "switch")
+"""Modules of the commands that act on a daemon, which are suggested for a slip of the fingers only: `stpo`."""
+
+_NEVER = 2.0
+
+
+class _Commands(Overview):
+    # `validate` is none of ours, and calibrate moves the arm.
+    ALIKE: ClassVar = {name: 0.75 for name, (place, _) in COMMANDS.items() if place in _ACT} | dict.fromkeys(
+        ("arm", "calibrate"), _NEVER
+    )
+
 
 def application(wanted: str | None = None) -> typer.Typer:
     """The whole command line, with the module of one command imported and the others only listed.
@@ -57,7 +69,7 @@ def application(wanted: str | None = None) -> typer.Typer:
     """
     app = typer.Typer(
         name="hapticd",
-        cls=Overview,
+        cls=_Commands,
         context_settings={"help_option_names": ["-h", "--help"]},  # of every command below as well
         help="Run a haptic device: a 1 ms control loop with a stabilising law, and its measurements over ZeroMQ.",
         epilog="Example: hapticd run --config lab.toml",
@@ -76,11 +88,15 @@ def application(wanted: str | None = None) -> typer.Typer:
         else:
             app.command(name)(getattr(module, name))
     if wanted not in COMMANDS:
-        for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
+        known = any(wanted == point.name for point in points)
+        for point in points:
             if wanted is None:
                 _list_installed(app, point)
             elif wanted == point.name:
                 _add_installed(app, point)
+            elif not known:  # a slip, for which its name may be suggested
+                app.command(point.name, hidden=True)(_listed)
     return app
 
 

@@ -67,6 +67,7 @@ def devices(
             {
                 **asdict(plugin),
                 "problem": one.problem,
+                "looks": one.looks,
                 "devices": [asdict(device) for device in one.devices],
                 "diagnoses": [asdict(diagnosis) for diagnosis in one.diagnoses],
             }
@@ -130,5 +131,8 @@ def _lines(looked: Discovery) -> Iterator[tuple[Row, tuple[Details, ...]]]:
     lacks = [(one.text, one.mend) for one in looked.diagnoses if one.mark == "problem" and not looked.devices]
     if looked.problem:
         yield (looked.driver, "-", "-", "-", "could not look"), ((looked.problem, ()), *lacks)
+    elif not looked.looks:
+        why = "it has no `find`, and so it cannot tell which devices are there; hapticd run opens one all the same"
+        yield (looked.driver, "-", "-", "-", "does not look"), ((why, ()), *lacks)
     elif not looked.devices:
         yield (looked.driver, "-", "-", "-", "none found"), ((looked.absent, ()), *lacks)

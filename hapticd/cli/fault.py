@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from dataclasses import asdict
@@ -12,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from hapticd import replacing
 from hapticd.cli.group import Overview
 from hapticd.cli.local_time import moment
 from hapticd.cli.watch.plot import LABEL_WIDTH, SLICE_S, Trace, plot
@@ -106,20 +108,21 @@ def export(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write; standard output when not given.")
     ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the output file if it exists.")] = False,
 ) -> None:
     """Write every field of every tick of a fault record as CSV; t_s is the time since the fault.
 
     Example: hapticd fault export --output fault.csv
     """
+    there = None if output is None else replacing.place(output, overwrite)
     record = read(_find(name, instance, directory))
-    if output is None:
+    if there is None:
         write_csv(record, sys.stdout)
         return
-    try:
-        with output.open("w", newline="", encoding="utf-8") as file:
-            write_csv(record, file)
-    except OSError as error:
-        raise HapticdError(f"{output}: {error.strerror}") from error
+    table = io.StringIO(newline="")
+    write_csv(record, table)
+    replacing.write(there, table.getvalue().encode())
+    typer.echo(f"{output}: {len(record.ticks)} rows of {record.name}")
 
 
 def _places(instance: str, directory: Path | None) -> list[Path]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Mapping
-from typing import Any
+from difflib import SequenceMatcher, get_close_matches
+from typing import Any, ClassVar
 
 import typer
 from typer.core import TyperGroup
@@ -14,7 +15,13 @@ EXIT_MISUSED = 2
 
 
 class Overview(TyperGroup):
-    """A group whose help has of each command the whole first sentence, in as many lines as that takes."""
+    """A group whose help has of each command the whole first sentence, in as many lines as that takes.
+
+    Attributes:
+        ALIKE: how alike a mistyped name must be to one of these before that one is suggested, 0 to 1; above 1: never.
+    """
+
+    ALIKE: ClassVar[Mapping[str, float]] = {}
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Show the overview to those who name no command."""
@@ -22,6 +29,25 @@ class Overview(TyperGroup):
             typer.echo(ctx.get_help(), err=True)
             raise typer.Exit(EXIT_MISUSED)
         return super().parse_args(ctx, args)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command; suggest another one for a name that there is not, if it is harmless or near enough."""
+        self.suggest_commands = False  # typer's own knows no command that should not be suggested
+        try:
+            return super().resolve_command(ctx, args)
+        except typer.TyperException as error:
+            near = [] if args[0].startswith("-") else self._near(args[0])
+            if near and hasattr(error, "message"):
+                error.message = f"{error.message.rstrip('.')}. Did you mean {', '.join(map(repr, near))}?"
+            raise
+
+    def _near(self, name: str) -> list[str]:
+        """The commands that may have been meant, the nearest first."""
+        return [
+            one
+            for one in get_close_matches(name, list(self.commands))
+            if SequenceMatcher(None, name, one).ratio() >= self.ALIKE.get(one, 0.0)
+        ]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a name and a sentence for each command."""

@@ -112,9 +112,7 @@ def show_plugins(described: list[Plugin], table_name: str, as_json: bool) -> Non
                     table.add_row("[dim]with[/]", "", f"[dim]{escape(parameter.only_with)}[/]")
                 branch = parameter.only_with
                 default = "required" if parameter.required else _shown_default(parameter.default)
-                meaning = (
-                    f"{parameter.description}; {parameter.allowed}" if parameter.allowed else parameter.description
-                )
+                meaning = "; ".join(filter(None, (parameter.description, parameter.allowed)))
                 table.add_row(escape(parameter.key), escape(default), escape(meaning))
             console.print(table)
         console.print()

@@ -76,7 +76,9 @@ def simulate(
         _replay(replay, config, duration, law or [], hand, output, overwrite, as_json)
         return
     if config is None or duration is None:
-        raise typer.BadParameter("needs --config and --duration, or --replay")
+        needed = {"--config": config, "--duration": duration}
+        missing = [option for option, given in needed.items() if given is None]
+        raise typer.BadParameter(f"needs {missing[0] if len(missing) == 1 else '--config and --duration, or --replay'}")
     if law:
         raise typer.BadParameter("--law goes with --replay; without it the configuration names the law")
     loaded = load(config)

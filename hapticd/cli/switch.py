@@ -56,13 +56,15 @@ def switch(
     if after != before and not ours:
         replace(path, after)
     if running is None:
-        outcome = f"no daemon {instance!r} runs; it has effect at its next start"
+        outcome = f"no daemon {instance!r} runs"
+        if after != before:
+            outcome += "; it has effect at its next start"
     elif not ours:
         outcome = f"daemon {instance!r} runs {running} and goes on with that"
     else:
         _take_over(path, before, after, instance)
-        outcome = f"daemon {instance!r} has taken it over"
-    for line in _changes(before, after):
+        outcome = f"daemon {instance!r} has {'read it again' if after == before else 'taken it over'}"
+    for line in _changes(before, after) or ["nothing to change" if after == before else "says the same in other words"]:
         typer.echo(f"{path}: {line}")
     typer.echo(outcome)
 
@@ -115,7 +117,7 @@ def _changes(before: str, after: str) -> list[str]:
         if old.get(key) != new.get(key):
             is_now = f"{key} = {shown_value(new[key])}" if key in new else f"{key} is gone"
             lines.append(f"{is_now} ({f'was {shown_value(old[key])}' if key in old else 'was not set'})")
-    return lines or ["nothing to change"]
+    return lines
 
 
 def _controller(text: str) -> dict[str, Any]:

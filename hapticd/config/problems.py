@@ -14,6 +14,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from hapticd.errors import alike
+
 Key = str | int
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -93,12 +95,7 @@ class Problems:
 
 def nearest(name: str, known: Sequence[str]) -> str:
     """Advice for an unknown name: the nearest known one, or all of them."""
-    import difflib  # for an error only
-
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
-    if near:
-        return f'did you mean "{near[0]}"?'
-    return f"known here: {', '.join(known) or 'nothing'}"
+    return alike(name, known) or f"known here: {', '.join(known) or 'nothing'}"
 
 
 def key_path(path: Sequence[Key]) -> str:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import inspect
-
-from hapticd import plugins
 from hapticd.device import FoundDevice
 from hapticd.discovery import Discovery
 from hapticd.doctor.finding import Finding, ok, own_command, problem, unknown
-from hapticd.driver import Driver
 
 
 def needs(looked: Discovery) -> list[Finding]:
@@ -38,7 +34,7 @@ def devices(looked: Discovery, daemon: int) -> list[Finding]:
         return [_state(device, name, usable) for device in looked.devices]
     if looked.problem:
         return [unknown(f"{name} did not look")]
-    if inspect.getattr_static(plugins.driver(name), "find") is vars(Driver)["find"]:
+    if not looked.looks:
         return [unknown(f"{name} cannot look for its devices")]
     return [problem(f"{name} finds no device", f"# {looked.absent}")]
 

@@ -16,7 +16,7 @@ from typing import IO, Any
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.offline.run import Row
 from hapticd.offline.space_row import SpaceRow
-from hapticd.replacing import obstacle, put
+from hapticd.replacing import place, put
 
 CSV_ROW_BYTES = 130
 """About what a row of a CSV file takes: ten numbers, most with all their digits."""
@@ -133,14 +133,7 @@ def open_trace(path: Path, rows: int, overwrite: bool, names: Sequence[str] = Ro
     """
     if path.suffix not in _SUFFIXES:
         raise ConfigError(f"{path}: must end in {' or '.join(_SUFFIXES)}")
-    path = path.resolve() if path.is_symlink() else path  # a link stays a link
-    reason = obstacle(path)
-    if reason:
-        raise ConfigError(f"{path}: {reason}")
-    if path.exists() and not overwrite:
-        raise ConfigError(f"{path}: exists; add --overwrite to replace it")
-    if not path.parent.is_dir():
-        raise ConfigError(f"{path}: there is no directory {path.parent}")
+    path = place(path, overwrite)  # a link stays a link
     _check_room(path, rows, len(names))
     try:
         if path.suffix == ".csv":

@@ -79,6 +79,34 @@ def test_misuse_is_a_line_with_advice_and_exit_code_2(arguments: list[str], name
     assert see == f"  see {advice}"
 
 
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [("recrod", "'record'"), ("plto", "'plot'"), ("hapkit-tabel", "'hapkit-table'"), ("relaod", "'reload', 'record'")],
+)
+def test_a_mistyped_command_is_told_from_all_that_are_installed(typed: str, meant: str) -> None:
+    """Those of the entry-point group were not among them: for `recrod` it was `reload`."""
+    assert hapticd(typed).stderr.splitlines()[0] == f"hapticd: No such command '{typed}'. Did you mean {meant}?"
+
+
+@pytest.mark.parametrize("typed", ["validate", "calibrat", "calibrated", "ar", "armm"])
+def test_what_moves_an_arm_or_lets_it_push_is_no_suggestion(typed: str) -> None:
+    said = hapticd(typed).stderr
+    assert f"No such command '{typed}'" in said
+    assert "'calibrate'" not in said
+    assert "'arm'" not in said
+
+
+def test_the_choices_of_an_argument_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    see = "  see hapticd completion --help\n"
+    for arguments, said in (
+        (["completion"], "Missing argument 'SHELL'. Choose from: bash, zsh, fish"),
+        (["completion", "sh"], "Invalid value for 'SHELL': 'sh' is not one of 'bash', 'zsh', 'fish'."),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        assert (ended.value.code, capsys.readouterr().err) == (2, f"hapticd: {said}\n{see}")
+
+
 def test_the_overview_imports_no_command_and_nothing_heavy() -> None:
     script = (
         "import sys\nfrom hapticd.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
@@ -391,6 +419,39 @@ def test_controllers_lists_laws_for_people() -> None:
     assert "tdpa" not in only
     assert "minimum" in "".join(only.split()), "a word that is longer than its column is broken and not cut off"
     assert "…" not in only
+
+
+def test_a_parameter_without_a_description_is_told_by_what_it_may_be(tmp_path: Path) -> None:
+    """Its meaning began with a semicolon."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/damper.py").write_text(
+        "from hapticd.law import Field, LawParams\n"
+        "class Params(LawParams):\n    gain: float = Field(0.5, ge=0.0, le=1.0)\n"
+        "class State:\n    pass\n"
+        "def start(state, params, snapshot):\n    return State()\n"
+        "def step(state, params, tick):\n    return 0.0\n"
+    )
+    done = hapticd("controllers", "lab.damper", PYTHONPATH=str(tmp_path), COLUMNS="120")
+    assert done.returncode == 0, done.stderr
+    (gain,) = [line.split() for line in done.stdout.splitlines() if "gain" in line]
+    assert gain == ["gain", "0.5", "from", "0", "to", "1"]
+    assert ";" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "kind", "typed", "meant"),
+    [
+        ("controllers", "law", "energy-cycl", "energy-cycle"),
+        ("devices", "driver", "omega6", "omega7"),
+    ],
+)
+def test_a_mistyped_plug_in_is_told_from_those_that_are_installed(
+    command: str, kind: str, typed: str, meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([command, typed])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.startswith(f'hapticd: no {kind} {typed!r}: did you mean "{meant}"? installed are ')
 
 
 def test_a_plugin_that_cannot_be_imported_is_listed_with_the_reason(tmp_path: Path) -> None:

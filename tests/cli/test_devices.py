@@ -71,6 +71,30 @@ def test_a_driver_that_found_none_says_what_to_do_and_what_this_computer_lacks(
     assert [one["mark"] for one in listed()["odd"]["diagnoses"]] == ["ok", "problem"]
 
 
+def test_of_a_driver_that_does_not_look_it_is_not_said_that_it_found_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`plug it in` was said of a device that the driver drove."""
+    (tmp_path / "mylab").mkdir()
+    (tmp_path / "mylab" / "rig.py").write_text(
+        "from hapticd.driver import Driver\n"
+        "class Rig(Driver):\n"
+        "    def _open(self): raise OSError\n"
+        "    def _enable(self): pass\n"
+        "    def _read(self): pass\n"
+        "    def _write(self, force_n): pass\n"
+        "    def _disable(self): pass\n"
+        "    def _close(self): pass\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    shown = hapticd("devices", "mylab.rig").stdout
+    assert "does not look\n    it has no `find`" in shown
+    assert "none found" not in shown
+    assert "plug it in" not in shown
+    assert listed("mylab.rig")["mylab.rig"]["looks"] is False
+    assert listed("loopback")["loopback"]["looks"] is True
+
+
 @pytest.mark.parametrize("find", ["raise ValueError('odd')", "os.abort()"])
 def test_a_driver_that_fails_is_told_beside_the_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, find: str

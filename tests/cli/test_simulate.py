@@ -203,6 +203,20 @@ def test_the_wall_clock_is_refused_since_the_numbers_would_depend_on_the_host(tm
     assert 'device.options.clock = "wall": must be "ticks" offline' in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "needs --config and --duration, or --replay"),
+        (["-c", "nofile.toml"], "needs --duration"),
+        (["-d", "1"], "needs --config"),
+    ],
+)
+def test_the_option_that_is_missing_is_named(arguments: list[str], said: str) -> None:
+    done = simulate(*arguments)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[0] == f"hapticd: Invalid value: {said}"
+
+
 def test_overwrite_replaces_the_file_only_when_the_run_is_complete(tmp_path: Path) -> None:
     old = tmp_path / "run.csv"
     old.write_text("mine")

@@ -70,7 +70,7 @@ def test_what_is_there_already_is_no_change(file: Path) -> None:
     before = file.stat()
     done = switch(file, "energy-cycle", "--set", "window=2")
     assert done.returncode == 0
-    assert "nothing to change" in done.stdout
+    assert done.stdout == f"{file}: nothing to change\nno daemon 'default' runs\n"
     assert (file.stat().st_ino, file.stat().st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
 
 

@@ -301,6 +301,23 @@ def test_a_picture_is_kept_that_fetches_nothing(feed: Feed, tmp_path: Path) -> N
     assert "url(" not in re.sub(r"url\(#[^)]*\)", "", drawn)
 
 
+def test_a_picture_replaces_no_file_unasked_and_is_called_what_it_is(
+    feed: Feed, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = tmp_path / "watch.svg"
+    kept.write_text("mine")
+    for path, said in (
+        (kept, "exists; add --overwrite to replace it"),
+        (tmp_path / "watch.png", "must end in .svg"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["watch", "--picture", str(path), "--connect", feed.wire.endpoint])
+        assert (ended.value.code, capsys.readouterr().err) == (2, f"hapticd: {path}: {said}\n")
+    assert kept.read_text() == "mine"
+    plain(feed, "--picture", str(kept), "--overwrite", until=lambda _: False)
+    assert "ARMED" in kept.read_text()
+
+
 def test_once_without_a_daemon_fails_with_one_line(
     feed: Feed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -50,6 +50,13 @@ def test_the_daemon_is_asked_which_file_it_runs_and_takes_the_edit_over(daemon: 
         assert subscriber.until("hapticd/status", law="tdpa")["config_file"] == str(daemon.config)
 
 
+def test_what_is_in_force_already_is_not_said_to_be_taken_over(daemon: Daemon) -> None:
+    assert switch(daemon, "none").returncode == 0
+    done = switch(daemon, "none")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"{daemon.config}: nothing to change\ndaemon 'default' has read it again\n"
+
+
 def test_what_only_the_daemon_can_refuse_is_taken_back(daemon: Daemon) -> None:
     """The file could be started with; that another edit in it needs a restart is known to the daemon alone."""
     good = daemon.config.read_text()

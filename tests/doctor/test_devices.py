@@ -146,10 +146,9 @@ def test_a_device_that_cannot_be_used_is_a_problem_unless_there_is_another() -> 
     says(third, "ok", "rig 9: not calibrated")
 
 
-def test_a_driver_that_cannot_look_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_driver_that_cannot_look_is_no_problem() -> None:
     """Looking is optional; that it found nothing would then be a claim about nothing."""
-    monkeypatch.setattr(plugins, "driver", lambda _: Driver)
-    says(driver.devices(Discovery("odd"), 0), "unknown", "odd cannot look")
+    says(driver.devices(Discovery("odd", looks=False), 0), "unknown", "odd cannot look")
 
 
 def test_beside_the_daemon_nothing_is_looked_for(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:

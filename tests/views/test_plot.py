@@ -180,7 +180,12 @@ def test_what_is_asked_for_wrongly_is_said_in_one_line(
         ("no.csv", None, "cannot be read: No such file"),
         ("empty.csv", b"", "has no column t_s, x_m, force_n"),
         ("header.csv", b"t_s,x_m,force_n\n", "holds no tick"),
-        ("words.csv", b"t_s,x_m,force_n\n0,1,two\n", "is no table of numbers"),
+        (
+            "words.csv",
+            b"t_s,x_m,force_n\n0,1,two\n",
+            "is no table of numbers; name a table that `hapticd simulate` wrote, or the .mcap of a recording",
+        ),
+        ("exported.csv", b"run,timestamp\n0,1\n", "is a table of `hapticd record export`; name a table"),
         ("ragged.csv", b"t_s,x_m,force_n\n0,1\n", "has 3 names for 2 columns"),
         ("binary.csv", bytes(range(256)), "is no table of numbers"),
         ("other.csv", b"a,b\n1,2\n", "has no column t_s, x_m, force_n: it is no run of a device"),

@@ -32,6 +32,8 @@ _NO_NPZ = (
     ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError, TypeError, NotImplementedError, RuntimeError,
 )  # fmt: skip
 
+_WANTED = "name a table that `hapticd simulate` wrote, or the .mcap of a recording"
+
 Columns = dict[str, npt.NDArray[Any]]
 
 
@@ -61,7 +63,10 @@ def open_source(path: Path) -> Source:
         raise ConfigError(f"{path}: must end in .mcap (hapticd record), or in .csv or .npz (hapticd simulate)")
     if path.suffix == ".mcap":
         return recorded(written(path), read(path))
-    columns = {name: column for name, column in table(path).items() if name in Row._fields}
+    found = table(path)
+    if "t_s" not in found and "timestamp" in found:
+        raise HapticdError(f"{path}: is a table of `hapticd record export`; {_WANTED}")
+    columns = {name: column for name, column in found.items() if name in Row._fields}
     return Source(written(path), (Curves(written(path), columns),), None)
 
 
@@ -166,8 +171,8 @@ def _csv(path: Path) -> Columns:
         numbers = np.loadtxt(rows.splitlines(), delimiter=",", ndmin=2) if rows.strip() else np.empty((0, len(names)))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise HapticdError(f"{path}: is no table of numbers: {error}") from None
+    except ValueError:
+        raise HapticdError(f"{path}: is no table of numbers; {_WANTED}") from None
     if numbers.shape[1] != len(names):
         raise HapticdError(f"{path}: has {len(names)} names for {numbers.shape[1]} columns")
     return dict(zip(names, numbers.T, strict=False))

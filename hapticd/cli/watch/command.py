@@ -29,8 +29,9 @@ from hapticd.cli.remote import Instance, Keys
 from hapticd.cli.watch.screen import SILENT_S, frame, one_line
 from hapticd.cli.watch.state import ScreenState
 from hapticd.client import Client, Event, Record, SilenceError, Status
-from hapticd.errors import HapticdError
+from hapticd.errors import ConfigError, HapticdError
 from hapticd.paths import DEFAULT_INSTANCE, telemetry_endpoint
+from hapticd.replacing import place
 
 FRAME_S = 0.1
 """Time between two pictures [s]."""
@@ -57,6 +58,7 @@ def watch(
     picture: Annotated[
         Path | None, typer.Option("--picture", help="Keep four seconds as an SVG picture of 80x24 characters and exit.")
     ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print every status as a line of JSON.")] = False,
 ) -> None:
     """Show live what a running daemon measures.
@@ -66,6 +68,10 @@ def watch(
 
     Example: hapticd watch --instance default
     """
+    if picture is not None:
+        if picture.suffix != ".svg":
+            raise ConfigError(f"{picture}: must end in .svg")
+        place(picture, overwrite)
     with suppress(KeyboardInterrupt):
         show(connect, instance, keys, once=once, picture=picture, as_json=as_json)
 

@@ -72,6 +72,17 @@ def test_the_stated_error_holds_at_points_that_were_not_looked_at(
     assert field.error_m < 0.7 * voxel
 
 
+def test_a_field_that_is_there_is_replaced_when_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = saved(tmp_path, ball(2))
+    field = path.with_suffix(".field")
+    field.write_text("mine")
+    status, _, said = run(capsys, path, "--voxel", 0.003)
+    assert (status, said) == (2, f"hapticd: {field}: exists; add --overwrite to replace it\n")
+    assert field.read_text() == "mine"
+    assert run(capsys, path, "--voxel", 0.003, "--overwrite")[0] == 0
+    assert Field.unpack(field.read_bytes())
+
+
 def test_distances_are_those_to_the_triangles(tmp_path: Path) -> None:
     """Against the plain formula for a box, whose faces its triangles are."""
     sides = np.array([0.04, 0.03, 0.02])

@@ -50,7 +50,8 @@ def test_csv_has_the_same_floats(recording: Recording) -> None:
     assert "position_m[1]" in header
     for name, texts in zip(header, zip(*rows, strict=True), strict=True):
         kind = columns[name].dtype
-        values = [text == "True" for text in texts] if kind == np.bool_ else [kind.type(text) for text in texts]
+        values = [text == "1" for text in texts] if kind == np.bool_ else [kind.type(text) for text in texts]
+        assert kind != np.bool_ or set(texts) <= {"0", "1"}, "as `hapticd simulate` writes it"
         assert same_bits(np.array(values, kind), np.ascontiguousarray(columns[name])), name
 
 

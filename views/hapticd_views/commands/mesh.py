@@ -26,6 +26,7 @@ def command(
     scale: Annotated[
         float, typer.Option(help="Metres that a unit of the file is: 0.001 where it is drawn in mm.")
     ] = 1.0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the output file if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Make a distance field of a mesh, for a scene with shape = "mesh".
@@ -40,16 +41,17 @@ def command(
         from hapticd_views.mesh.sampling import sample
     except ImportError as missing:
         raise HapticdError(f"{missing.name} is not installed: pip install 'hapticd[mesh]'") from None
-    from hapticd.replacing import write
+    from hapticd.replacing import place, write
 
     for option, value in (("--scale", scale), ("--voxel", voxel)):
         if value is not None and not 0.0 < value < math.inf:
             raise ConfigError(f"{option} {value:g}: must be above 0")
+    path = output or file.with_suffix(".field")
+    place(path, overwrite)
     mesh = read_mesh(file, scale)
     spacing_m = max(mesh.size_m) / _ALONG if voxel is None else voxel
     with progress_bar(1.0, file.name) as advance:
         field, error = sample(mesh, spacing_m, advance)
-    path = output or file.with_suffix(".field")
     content = field.pack()
     write(path, content)
     if as_json:

@@ -62,11 +62,17 @@ def single_columns(table: Table) -> Table:
 
 def _write_csv(table: Table, path: Path) -> None:
     columns = single_columns(table)
-    plain = [values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values()]
+    plain = [_plain(values) for values in columns.values()]
     with path.open("x", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(zip(*plain, strict=True))  # a float is written as repr has it: the shortest that comes back
+
+
+def _plain(values: Values) -> list[Any]:
+    """The values of a column, true and false as 1 and 0: a table of numbers is one for every program."""
+    listed = values.tolist() if isinstance(values, np.ndarray) else values
+    return [int(one) if isinstance(one, bool) else one for one in listed]
 
 
 def _write_parquet(table: Table, path: Path) -> None:

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from hapticd import replacing
 from hapticd.errors import ConfigError, HapticdError
-from hapticd.replacing import obstacle, put
+from hapticd.replacing import put
 
 
 def place(path: Path, overwrite: bool) -> Path:
@@ -18,17 +19,10 @@ def place(path: Path, overwrite: bool) -> Path:
     Raises:
         ConfigError: something is there already, a recording is being written to it, or it is no place for a file.
     """
-    place = path.resolve() if path.is_symlink() else path
-    reason = obstacle(place)
-    if reason:
-        raise ConfigError(f"{place}: {reason}")
-    if place.exists() and not overwrite:
-        raise ConfigError(f"{path}: exists; add --overwrite to replace it")
-    if place.exists() and not _free(place):
+    there = replacing.place(path, overwrite)
+    if there.exists() and not _free(there):
         raise being_recorded(path)
-    if not place.parent.is_dir():
-        raise ConfigError(f"{path}: there is no directory {place.parent}")
-    return place
+    return there
 
 
 def being_recorded(path: Path) -> ConfigError:
