@@ -261,7 +261,8 @@ static inline void move_and_sense(plant_state *s, const plant_params *p, double 
 }
 
 static inline void run(plant_state *plant, const plant_params *epochs, loop_state *loop, const loop_params *params,
-                       const segment *segments, law_state *state, const law_params *law, law_tick *tick) {
+                       const segment *segments, law_state *state, const law_params *law, law_tick *tick,
+                       bool settling) {
     for (int64_t at = params->first_segment; at < params->end_segment; at++) {
         const segment *now = &segments[at];
         const plant_params *mechanics = &epochs[now->epoch];
@@ -311,8 +312,10 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
             } else if (tick->applied_n < -loop->peak_force_n) {
                 loop->peak_force_n = -tick->applied_n;
             }
-            double off = plant->x_m - params->target_m;
-            if (!(-params->band_m <= off && off <= params->band_m)) loop->outside_tick = count;
+            if (settling) {
+                double off = plant->x_m - params->target_m;
+                if (!(-params->band_m <= off && off <= params->band_m)) loop->outside_tick = count;
+            }
             if (last_window) {
                 if (plant->x_m < loop->low_m) loop->low_m = plant->x_m;
                 if (plant->x_m > loop->high_m) loop->high_m = plant->x_m;
@@ -328,7 +331,7 @@ static inline void run(plant_state *plant, const plant_params *epochs, loop_stat
 
 void sweep(int64_t first, int64_t stop, plant_state *plants, const plant_params *epochs, loop_state *loops,
            const loop_params *params, const segment *segments, law_state *states, const law_params *laws,
-           const law_tick *ticks) {
+           const law_tick *ticks, bool settling) {
     for (int64_t at = first; at < stop; at++) {
         plant_state plant = plants[at];
         loop_state loop = loops[at];
@@ -336,7 +339,7 @@ void sweep(int64_t first, int64_t stop, plant_state *plants, const plant_params 
         law_state state = states[at];
         law_params law = laws[at];
         law_tick tick = ticks[at];
-        run(&plant, epochs, &loop, &given, segments, &state, &law, &tick);
+        run(&plant, epochs, &loop, &given, segments, &state, &law, &tick, settling);
         loops[at] = loop;
         states[at] = state;
     }

@@ -20,7 +20,7 @@ _LONGEST_S = 60.0
 
 def command(
     config: Annotated[
-        Path | None, typer.Option(help="Configuration; the shipped wall of 12 kN/m when not given.")
+        Path | None, typer.Option("--config", "-c", help="Configuration; the shipped wall of 12 kN/m when not given.")
     ] = None,
     below: Annotated[float, typer.Option(help="Largest error of the position that will do [m].")] = 1e-6,
     duration: Annotated[float, typer.Option(help="Simulated time of each run [s].")] = 2.0,

@@ -26,7 +26,7 @@ def command(
     point: Annotated[
         str | None, typer.Option(help="One place alone: SEED:INDEX, or NAME=VALUE,... as mass_kg=1e-6,rate_hz=3.")
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("extremes"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("extremes"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,

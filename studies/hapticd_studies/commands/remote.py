@@ -27,7 +27,7 @@ def command(
         bool, typer.Option("--quick", help="A few clients and no ladder: about 20 s on one core.")
     ] = False,
     replay: Annotated[str | None, typer.Option(help="One client again, KIND:SEED:INDEX.")] = None,
-    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("remote"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("remote"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,

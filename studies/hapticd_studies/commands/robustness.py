@@ -27,7 +27,10 @@ def command(
     ] = "all",
     only: Annotated[str | None, typer.Option(help="One device again, SEED:INDEX.")] = None,
     output: Annotated[
-        Path | None, typer.Option(help="Folder of the results; `robustness`, and with --only none, when not given.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Folder of the results; `robustness`, and with --only none, when not given."
+        ),
     ] = None,
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,

@@ -20,7 +20,8 @@ _MOST_LINES = 24  # of a configuration that is printed and not only saved
 
 def command(
     config: Annotated[
-        Path | None, typer.Option(help="Configuration; the shipped one with every term when not given.")
+        Path | None,
+        typer.Option("--config", "-c", help="Configuration; the shipped one with every term when not given."),
     ] = None,
     tolerance: Annotated[float, typer.Option(help="Largest change of an answer, a share.")] = 0.05,
     duration: Annotated[float, typer.Option(help="Simulated time of each run [s].")] = 3.0,

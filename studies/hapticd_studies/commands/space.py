@@ -34,7 +34,7 @@ def command(
         int, typer.Option(help="Random devices at random places to step against their eigenvalues.")
     ] = 1000,
     seed: Annotated[int, typer.Option(help="Of these.")] = 1,
-    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("space"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("space"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,
 ) -> None:
     """Find what stiffness a device with three axes holds, by direction and place, and whether stepping agrees.

@@ -23,7 +23,7 @@ def command(
         str | None, typer.Option(help="As energy-cycle:cap=none,tdpa; not given: five that are shipped.")
     ] = None,
     only: Annotated[str | None, typer.Option(help="One case again, SEED:INDEX: prints its configuration.")] = None,
-    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("space-robustness"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("space-robustness"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,

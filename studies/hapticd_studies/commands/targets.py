@@ -32,7 +32,7 @@ def command(
     also: Annotated[
         str, typer.Option(help="Words of targets that missed.md has even where the first law reaches them.")
     ] = "tremor,unfelt",
-    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("targets"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("targets"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file instead of the table.")] = False,

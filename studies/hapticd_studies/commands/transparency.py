@@ -39,7 +39,10 @@ def command(
     ] = False,
     replay: Annotated[str | None, typer.Option(help="One device again, SEED:INDEX.")] = None,
     output: Annotated[
-        Path | None, typer.Option(help="Folder of the results; `transparency`, and with --replay none, if not given.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Folder of the results; `transparency`, and with --replay none, if not given."
+        ),
     ] = None,
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,

@@ -34,7 +34,8 @@ def command(
         int, typer.Option(min=1, max=1000, help="Presses of a cell, evenly from 0 to 10 mm higher; all must settle.")
     ] = 1,
     config: Annotated[
-        Path | None, typer.Option(help="Configuration of the press; the shipped omega7 device when not given.")
+        Path | None,
+        typer.Option("--config", "-c", help="Configuration of the press; the shipped omega7 device when not given."),
     ] = None,
     assign: Annotated[
         list[str] | None,
@@ -42,7 +43,7 @@ def command(
     ] = None,
     still: Annotated[float, typer.Option(help="Largest span of the position that counts as still [m].")] = 5e-5,
     place: Annotated[float, typer.Option(help="Largest error of the depth that counts as in place, a share.")] = 0.1,
-    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("zwidth"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("zwidth"),
     cluster: Annotated[str | None, typer.Option(help="Scheduler of dask whose workers do it, tcp://HOST:PORT.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget what an interrupted run has done.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file too.")] = False,
