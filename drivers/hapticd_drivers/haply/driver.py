@@ -203,7 +203,8 @@ class Inverse3(Driver[Inverse3Options]):
         courier.send(message)
         while courier.waiting and courier.failed is None and time.monotonic() < end_s:
             courier.wait(courier.exchanges, min(0.005, patience_s))
-        if not self._take(courier):
+        # A new state may answer the message before, with the force that it set.
+        if (courier.waiting and courier.failed is None) or not self._take(courier):
             raise DeviceTimeoutError(
                 f"inverse3: the service at {self.options.url} did not answer within {patience_s:g} s: is it overloaded?"
             )

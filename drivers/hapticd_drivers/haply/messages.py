@@ -119,9 +119,15 @@ def _vector(value: object) -> list[float]:
 
 def _number(value: object, name: str) -> float:
     number = value.get(name) if isinstance(value, dict) else None
-    if isinstance(number, bool) or not isinstance(number, int | float) or not math.isfinite(number):
+    if isinstance(number, bool) or not isinstance(number, int | float):
         raise ValueError(f"{name} is no number")
-    return float(number)
+    try:
+        found = float(number)
+    except OverflowError:  # a whole number of hundreds of digits
+        found = math.inf
+    if not math.isfinite(found):
+        raise ValueError(f"{name} is no number")
+    return found
 
 
 def _map(message: str | bytes) -> dict[str, Any]:

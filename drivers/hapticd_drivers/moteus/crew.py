@@ -45,7 +45,7 @@ class MoteusMotor(Motor):
     """What is known of a controller and its motor.
 
     Attributes:
-        restarted: it has been switched off and on since it was enabled.
+        restarted: it has been switched off and on, and nobody has yet asked whether it knows its home.
         most_n_m: torque that it may apply [N m].
         mode, fault, home_state: its registers.
         firmware, serial: what it is; "" until it has said so.
@@ -108,18 +108,28 @@ class MoteusCrew(Crew):
         self._say_until(lambda index: self._send(index, registers.QUERY), lambda index: motors[index].heard)
         self.model = f"moteus (firmware {motors[0].firmware})"
         self.serial = " ".join(motor.serial for motor in motors)
+        self.accept_restarts()
 
     def enable(self) -> None:
-        """Clear faults whose cause is gone, and have all follow a torque of 0."""
+        """Clear faults whose cause is gone, and have all follow a torque of 0.
+
+        One that was switched off and on since it was last looked at may count from elsewhere, and is refused.
+        """
         self._say_until(
             lambda index: self._send(index, registers.STOP),
             lambda index: self._motors[index].heard and self._motors[index].mode == STOPPED,
             urgent=True,
         )
         for motor in self._motors:
-            motor.restarted = False
+            if motor.restarted:
+                raise self._has_restarted(motor)
         self._enabled_ns = time.monotonic_ns()
         self._say_until(self._send_no_torque, self._follows, urgent=True)
+
+    def accept_restarts(self) -> None:
+        """Go on with those that were switched off and on."""
+        for motor in self._motors:
+            motor.restarted = False
 
     def disable(self) -> None:
         """Let go, until all have said that they have."""
@@ -141,9 +151,7 @@ class MoteusCrew(Crew):
         """Why a controller follows no torque."""
         for motor in self._motors:
             if motor.restarted:  # it has followed the next torque at once, and its turns may count from elsewhere
-                return DeviceFaultError(
-                    f"{self._name}: controller {motor.address} was switched off and on: check its supply and plugs"
-                )
+                return self._has_restarted(motor)
             if motor.mode != POSITION_MODE:
                 if motor.mode in PREPARING and time.monotonic_ns() - self._enabled_ns < PREPARING_S * 1e9:
                     continue
@@ -192,6 +200,11 @@ class MoteusCrew(Crew):
             self.ask()
             self.await_states(_LOOK_S)
             self.note()
+
+    def _has_restarted(self, motor: MoteusMotor) -> DeviceFaultError:
+        return DeviceFaultError(
+            f"{self._name}: controller {motor.address} was switched off and on: check its supply and plugs"
+        )
 
     def _have_let_go(self, urgent: bool) -> None:
         self._say_until(

@@ -114,6 +114,10 @@ class Crew(ABC):
         """
 
     @abstractmethod
+    def accept_restarts(self) -> None:
+        """Know that whoever was switched off and on until now has been taken for one whose home is to be looked at."""
+
+    @abstractmethod
     def ask(self) -> None:
         """Ask for the states where they do not come by themselves, and leave the torque alone."""
 

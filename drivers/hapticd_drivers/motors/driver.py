@@ -9,7 +9,14 @@ from typing import ClassVar, TypeVar
 
 from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverState
-from hapticd.errors import ConfigError, DeviceProtocolError, DeviceTimeoutError, DriverError, DriverStateError
+from hapticd.errors import (
+    ConfigError,
+    DeviceFaultError,
+    DeviceProtocolError,
+    DeviceTimeoutError,
+    DriverError,
+    DriverStateError,
+)
 from hapticd.trace import DriverTrace
 from hapticd_drivers.claims import Claims
 from hapticd_drivers.motors.crew import Crew
@@ -176,6 +183,7 @@ class MotorDriver(Driver[MotorOptionsT]):
             else:
                 self._bear_silence(crew)
             if not enabled:
+                crew.accept_restarts()
                 crew.ask()
             return self._sample
         finally:
@@ -273,7 +281,11 @@ class MotorDriver(Driver[MotorOptionsT]):
             count_m=drum.resolution_m,
             span_m=options.highest_m - options.lowest_m,
         )
-        motion.check_sign(drive)
+        try:
+            motion.check_sign(drive)
+        except DeviceFaultError:  # what was believed before, or the options say, has just been disproved
+            self._sign_checked = False
+            raise
         if options.homing == "absolute":
             return
         if options.homing == "here":

@@ -122,6 +122,9 @@ class OdriveCrew(Crew):
             self._close_loop(index)
         self._enabled_ns = time.monotonic_ns()
 
+    def accept_restarts(self) -> None:
+        """None is told of: one that was switched off and on is known by its silence."""
+
     def disable(self) -> None:
         """Let go, until all have said that they have."""
         motors = self._motors

@@ -322,7 +322,11 @@ class RigDriver(Driver[RigOptionsT]):
             count_m=abs(axis.count_m),
             span_m=axis.highest_m - axis.lowest_m,
         )
-        motion.check_sign(drive)
+        try:
+            motion.check_sign(drive)
+        except DeviceFaultError:  # what was believed before, or the options say, has just been disproved
+            self._sign_checked = False
+            raise
         if self._knows_home:
             return None
         match self._axis_options(index).homing:

@@ -155,10 +155,14 @@ def find_switch(drive: Drive, towards: float) -> int:
         towards: -1 downwards, 1 upwards.
 
     Raises:
-        DeviceFaultError: it does not close, or the handle moves too fast.
+        DeviceFaultError: it does not open or close, or the handle moves too fast.
     """
-    if drive.push(0.0).switch:
-        _go(drive, -towards, math.inf, while_switch=True)
+    if drive.push(0.0).switch and _go(drive, -towards, math.inf, while_switch=True).switch:
+        drive.push(0.0)
+        raise DeviceFaultError(
+            f"axis {drive.name}: the home switch does not open on the way to the other end of the travel: is it "
+            "stuck, or one that is closed at rest?"
+        )
     closed = _go(drive, towards, math.inf, while_switch=False)
     _settled(drive)
     if not closed.switch:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -118,6 +119,33 @@ def test_disable_and_close_leave_a_force_of_zero(service: FakeService) -> None:
     assert service.cursor.force_n == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize("end", [Inverse3.disable, Inverse3.close], ids=["disable", "close"])
+def test_the_answer_to_the_force_before_is_none_to_the_zero(
+    service: FakeService, monkeypatch: pytest.MonkeyPatch, end: Callable[[Inverse3], None]
+) -> None:
+    """A service that answered it late and then hung was believed to have let go."""
+    driver = pressing(service)
+    monkeypatch.setattr(haply_driver, "URGENT_S", 0.5)
+    obey = service._obey
+    heard, goes_on = threading.Event(), threading.Event()
+
+    def late(said: dict[str, Any]) -> None:
+        if heard.is_set():
+            goes_on.wait(10.0)
+        obey(said)
+        heard.set()
+        time.sleep(0.05)
+
+    monkeypatch.setattr(service, "_obey", late)
+    driver.write([0.0, 0.0, PUSH_N])
+    assert heard.wait(10.0)
+    end(driver)
+    assert service.cursor.force_n == [0.0, 0.0, PUSH_N]
+    assert "did not answer" in driver.force_left
+    goes_on.set()
+    driver.close()
+
+
 def test_a_second_program_is_refused_the_same_device_until_the_first_has_closed_it(service: FakeService) -> None:
     """The service lets any number of clients in, and a second one's zero force would take the first one's away."""
     first = pressing(service)
@@ -142,8 +170,17 @@ def test_one_message_a_force_and_one_state_a_message(service: FakeService) -> No
     driver.close()
 
 
+HUGE = f'{{"x": 1{400 * "0"}, "y": 0, "z": 0}}'
+"""A number in JSON may have any length, and no float may have this one."""
+
+
 @pytest.mark.parametrize(
-    "spoilt", ["", "no JSON", "[]", '{"inverse3": 5}', '{"inverse3":[{"device_id":"049D"}]}', "NaN"]
+    "spoilt",
+    [
+        *("", "no JSON", "[]", '{"inverse3": 5}', '{"inverse3":[{"device_id":"049D"}]}', "NaN"),
+        f'{{"inverse3":[{{"device_id":"049D","state":{{"cursor_position":{HUGE},"cursor_velocity":{HUGE}}}}}]}}',
+    ],
+    ids=["empty", "no JSON", "a list", "no devices", "no state", "NaN", "a huge number"],
 )
 def test_a_message_that_makes_no_sense_is_counted_and_not_believed(service: FakeService, spoilt: str) -> None:
     driver = pressing(service)

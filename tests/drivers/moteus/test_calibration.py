@@ -11,6 +11,7 @@ import pytest
 
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverStateError
 from hapticd_drivers.motors import crew
+from hapticd_drivers.rig import motion
 from tests.drivers.moteus.lab import Lab, axes
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
@@ -122,6 +123,67 @@ def test_a_motor_that_pushes_the_wrong_way_is_refused(bench: Lab) -> None:
     assert abs(bench.first.shaft.x_m + 0.035) < 5e-3
     with pytest.raises(DriverStateError):
         driver.enable()
+    driver.close()
+
+
+def test_a_controller_that_restarts_just_before_it_is_armed_is_refused(bench: Lab) -> None:
+    """Nobody had looked since: its answer to the arming showed it, and was believed to be at home 50 mm from there."""
+    driver = opened(bench)
+    driver.calibrate()
+    driver.enable()
+    driver.disable()
+    driver.read()
+    with bench.bench.lock:
+        bench.first.restart()
+    with pytest.raises(DeviceFaultError, match="switched off and on"):
+        driver.enable()
+    assert bench.first.torque_n_m == 0.0
+    for _ in range(3):
+        driver.read()
+    assert not driver.read().calibrated
+    with pytest.raises(DriverStateError, match="not known where the handle is"):
+        driver.enable()
+    driver.close()
+
+
+def test_a_calibration_in_which_a_controller_restarts_does_not_pass(
+    bench: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver = opened(bench)
+    find_stop = motion.find_stop
+
+    def find(drive: motion.Drive, towards: float) -> int:
+        at = find_stop(drive, towards)
+        with bench.bench.lock:
+            bench.first.restart()
+        drive.push(0.0)
+        return at
+
+    monkeypatch.setattr(motion, "find_stop", find)
+    with pytest.raises(DeviceFaultError, match="switched off and on"):
+        driver.calibrate()
+    assert bench.first.torque_n_m == 0.0
+    driver.close()
+
+
+@pytest.mark.parametrize("sign_checked", [False, True], ids=["it had passed before", "the options say so"])
+def test_a_sign_that_a_calibration_has_disproved_is_believed_no_more(bench: Lab, sign_checked: bool) -> None:
+    """With a reversed motor a wall pulls the hand in."""
+    driver = bench.driver(axes=axes(1), sign_checked=sign_checked, calibration_speed_m_per_s=0.1)
+    driver._state_wait_s = PATIENCE_S
+    driver.open()
+    driver.calibrate()
+    driver.enable()
+    driver.disable()
+    bench.first.shaft.motor = -1.0
+    with pytest.raises(DeviceFaultError, match="motor_reversed"):
+        driver.calibrate()
+    with pytest.raises(DriverStateError, match="not been checked that the motors push the right way"):
+        driver.enable()
+    assert not driver.read().calibrated
+    bench.first.shaft.motor = 1.0
+    driver.calibrate()
+    driver.enable()
     driver.close()
 
 

@@ -39,6 +39,15 @@ def test_a_switch_is_found_from_both_sides_of_it(starts_m: float) -> None:
     assert motion.find_switch(drive_of(handle), -1.0) * COUNT_M == pytest.approx(-0.02, abs=1e-4)
 
 
+@pytest.mark.parametrize("towards", [-1.0, 1.0])
+def test_a_switch_that_never_opens_gives_no_home(towards: float) -> None:
+    """Stuck, or closed at rest: the far end of the travel was taken for home."""
+    handle = Handle(switch_m=1.0)
+    with pytest.raises(DeviceFaultError, match="does not open"):
+        motion.find_switch(drive_of(handle), towards)
+    assert handle.forces_n[-1] == 0.0
+
+
 def test_a_handle_without_an_end_is_not_driven_for_ever() -> None:
     handle = Handle(stops_m=(-10.0, 10.0))
     with pytest.raises(DeviceFaultError, match="found no end"):

@@ -90,6 +90,20 @@ def test_what_is_wrong_with_a_motor_shows_at_harmless_force(
         driver.enable()
 
 
+def test_a_sign_that_a_calibration_has_disproved_is_believed_no_more(rig: Rig, make_driver: MakeDriver) -> None:
+    """With a reversed motor a wall pulls the hand in."""
+    driver = make_driver(axes=[{"homing": "here"}], sign_checked=True)
+    driver.open()
+    driver.calibrate()
+    driver.enable()
+    driver.disable()
+    rig.plant.motor = -1.0
+    with pytest.raises(DeviceFaultError, match="motor_reversed"):
+        driver.calibrate()
+    with pytest.raises(DriverStateError, match="nobody has checked that the motor pushes the right way"):
+        driver.enable()
+
+
 def test_a_reversed_motor_that_is_declared_passes_and_pushes_the_right_way(rig: Rig, make_driver: MakeDriver) -> None:
     rig.plant.motor = -1.0
     driver = make_driver(axes=[{"homing": "here", "motor_reversed": True}])
