@@ -30,7 +30,7 @@ class BlendFields:
     """The scalar fields that a blend of one contact's force keeps, `start_blend` to `blended`."""
 
     blending: bool
-    blend_tick: float  # periods done, -1 before the first tick
+    blend_tick: float  # periods done, -1 or less before the first tick
     blend_ticks: float  # periods from the old force to the new one
     blend_from_n: float  # the old force, held
     blend_from_x_m: float  # where it was applied
@@ -55,6 +55,12 @@ def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: in
     state.blend_limit_n = limit_n
 
 
+def begin_late(state: Any, periods: float) -> None:
+    """Have a transition that no tick has seen yet begin so many periods after the last one, and not right with it."""
+    if state.blending and state.blend_tick < 0.0:
+        state.blend_tick = -1.0 - periods
+
+
 def blended(state: Any, x_m: float, force_n: float, periods: float) -> float:
     """The force of one tick of a transition [N]; call it once a tick while `state.blending` and in contact.
 
@@ -73,7 +79,7 @@ def blended(state: Any, x_m: float, force_n: float, periods: float) -> float:
         periods: time since the last tick, in periods of the loop; more than one where deadlines were skipped.
     """
     done: float = state.blend_tick + periods
-    if done < 0.0:  # the first tick was sooner than a period after the one before: begun it has all the same
+    if done < 0.0:  # the first tick was sooner than a period after it was asked for: begun it has all the same
         done = 0.0
     state.blend_tick = done
     weight: float = done / state.blend_ticks
@@ -144,6 +150,7 @@ class Guard:
         "_axis_rate",
         "_force_goal_n",
         "_force_rate",
+        "_late_s",
         "_max_squared",
         "_ramp_s",
         "changing",
@@ -159,6 +166,7 @@ class Guard:
 
     def __init__(self, safety: SafetyConfig, info: DeviceInfo) -> None:
         self.latched = False
+        self._late_s = 0.0  # of the next tick's time, what had passed when the limits began to move
         self._ramp_s = safety.ramp_s
         self.max_force_n, self.max_axis_n, self.max_speed_m_per_s = limits(safety, info)
         self._aim(self.max_force_n, self.max_axis_n, safety.ramp_s)
@@ -182,6 +190,11 @@ class Guard:
         self.max_force_n = min(self.max_force_n, max(goal_n, math.hypot(*used_n)))
         self.max_axis_n = min(self.max_axis_n, max(goal_axis_n, *map(abs, used_n), 0.0))
         self._aim(goal_n, goal_axis_n, safety.ramp_s)
+
+    def begin_late(self, late_s: float) -> None:
+        """Have limits that are to move begin so long after the last tick, and not right with it [s]."""
+        if self.changing:
+            self._late_s = late_s
 
     def arm(self) -> bool:
         """Let forces through from now on; False while latched. The caller blends contacts in."""
@@ -272,11 +285,13 @@ class Guard:
     def _change(self, dt_s: float) -> None:
         """Move what is under way by one tick: force limits, a release."""
         moving = False
+        moved_s = max(0.0, dt_s - self._late_s)
+        self._late_s = 0.0
         if self.max_force_n != self._force_goal_n:
-            self.max_force_n = _towards(self.max_force_n, self._force_goal_n, self._force_rate * dt_s)
+            self.max_force_n = _towards(self.max_force_n, self._force_goal_n, self._force_rate * moved_s)
             moving = True
         if self.max_axis_n != self._axis_goal_n:
-            self.max_axis_n = _towards(self.max_axis_n, self._axis_goal_n, self._axis_rate * dt_s)
+            self.max_axis_n = _towards(self.max_axis_n, self._axis_goal_n, self._axis_rate * moved_s)
             moving = True
         if moving:
             self._take_limits()

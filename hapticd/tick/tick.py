@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from traceback import walk_tb
 from typing import TYPE_CHECKING
 
 from hapticd.config.models import SceneConfig, VelocityConfig
@@ -22,7 +21,7 @@ from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
-from hapticd.tick.guard import Guard, Mode, limits
+from hapticd.tick.guard import Guard, Mode, begin_late, limits
 from hapticd.tick.motion import Motion
 from hapticd.tick.remote.port import Port
 from hapticd.tick.remote.tick_ports import MakePort, TickPorts
@@ -273,6 +272,21 @@ class ControlTick:
         """Ramp the force to zero and stay disarmed."""
         self.guard.release(self.ramp_s if ramp_s is None else ramp_s)
 
+    def begin_late(self, late_s: float) -> None:
+        """Have the ramps that have been asked for since the last tick begin now, and not right after it.
+
+        Else they would have come that far in their first tick, with a step of the force. A release counts all of it:
+        the force that it lets out was held.
+
+        Args:
+            late_s: how long it took to make ready what they are for [s].
+        """
+        if self._simulated:
+            return
+        self.guard.begin_late(late_s)
+        for contact in (*self._under_law(), *self._fading_out(), *self.own_ports.axes):
+            begin_late(contact, late_s / self.period_s)
+
     def tare(self) -> bool:
         """Count positions from here on. False while forces are let through or it is not known where the device is."""
         if self.sight.blind or not self.sight.calibrated or self.guard.mode is not Mode.DISARMED:
@@ -372,10 +386,8 @@ class ControlTick:
             self._blend(contact)
 
     def _replace_laws(self, contact: Contact, error: BaseException, periods: float) -> None:
-        """A law raised or returned nonsense: all are replaced, and asked again."""
-        frames = {frame.f_globals.get("__name__") for frame, _ in walk_tb(error.__traceback__)}
-        failed = next((each for each in self._active if each.law.module.__name__ in frames), contact)
-        name = failed.law.module.__name__
+        """The law of a contact raised or returned nonsense: all are replaced, and asked again."""
+        name = contact.law.module.__name__
         self.fail_law(EventCode.LAW_FAILED, f"law {name}: {in_words(error, name)}")
         for each in self._active:
             each.act(periods)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
+from hapticd import plugins
+from hapticd.config.loading import parse
 from hapticd.errors import DeviceFaultError
 from hapticd.loop.memory import SUPERVISOR_BEAT
+from hapticd.supervisor.reload import switch_request
 from hapticd.tick.event import EventCode
 from tests.loop.clock import Clock
-from tests.loop.started import Started
+from tests.loop.started import WALL, Started
 
 
 @pytest.fixture
@@ -104,6 +108,73 @@ def test_a_ramp_begins_with_the_first_tick_however_long_the_device_took_to_let_f
     assert written[:51] == pytest.approx([0.2 * tick for tick in range(51)])
     assert EventCode.LOOP_LATE not in [event.code for event in started.told]
     assert started.skipped >= int(enable_s * 1e3)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 2e-3, 0.02, 0.04])
+@pytest.mark.parametrize(("to", "step_n"), [("stiffness_n_per_m = 2000.0", 0.1), ("stiffness_n_per_m = 200.0", -0.08)])
+def test_a_ramp_of_a_switch_begins_once_its_law_has_started_however_long_that_took(
+    monkeypatch: pytest.MonkeyPatch, start_s: float, to: str, step_n: float
+) -> None:
+    """It was counted as the ramp's: at 20 ms the force stepped by 1.9 N of 5 in the first tick, instead of 0.1."""
+    started, written = holding(monkeypatch, start_s)
+    wanted = parse(f'[[scene.walls]]\n{to}\n[controller]\nlaw = "none"\n', "wanted")
+    switched(started, switch_request(started.config, wanted))
+    first = last(written[:100], 5.0)
+    assert written[first : first + 51] == pytest.approx([5.0 + step_n * tick for tick in range(51)])
+    assert started.skipped >= int(start_s * 1e3)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 2e-3, 0.02, 0.04])
+def test_a_limit_comes_down_from_then_on_as_well(monkeypatch: pytest.MonkeyPatch, start_s: float) -> None:
+    """By 0.8 N of 2 in the first tick."""
+    started, written = holding(monkeypatch, start_s)
+    wanted = parse(f'{WALL}[controller]\nlaw = "none"\n[safety]\nmax_force_n = 3.0\n', "wanted")
+    switched(started, switch_request(started.config, wanted))
+    first = last(written[:100], 5.0)
+    assert written[first : first + 51] == pytest.approx([5.0 - 0.04 * tick for tick in range(51)])
+
+
+def test_a_release_counts_the_time_in_which_a_law_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Since the force was held: it is gone as soon as without any other request."""
+    started, written = holding(monkeypatch, 0.01)
+    wanted = parse(f'{WALL}[controller]\nlaw = "none"\n', "wanted")
+    switched(started, switch_request(started.config, wanted), release=True)
+    released_n = written[70:]
+    assert released_n[:2] == pytest.approx([4.9, 4.8])
+    assert sum(force_n > 0.0 for force_n in released_n) == 49 - 10
+
+
+def holding(monkeypatch: pytest.MonkeyPatch, start_s: float) -> tuple[Started, list[float]]:
+    """A loop that holds 5 N, under another law than one whose start takes so long; and what it will have written."""
+    started = Started(Clock(monkeypatch))
+    started.driver.sample.position_m[0] = -0.005
+    written: list[float] = []
+    monkeypatch.setattr(started.driver, "_write", lambda force_n: written.append(force_n[0]))
+    law = plugins.law("none")
+    monkeypatch.setattr(law, "start", lambda *_: started.clock.pass_s(start_s))
+    started.loop.requests.know("none", law)
+    return started, written
+
+
+def last(written: list[float], held_n: float) -> int:
+    """The last tick that wrote this force."""
+    return max(at for at, force_n in enumerate(written) if force_n == pytest.approx(held_n))
+
+
+def switched(started: Started, request: dict[str, Any], release: bool = False) -> None:
+    """Run with a switch once the ramp of the arming is over, and perhaps a release right before it."""
+    tick = started.tick
+
+    def each_tick(number: int) -> None:
+        started.shared.words[SUPERVISOR_BEAT] = started.clock.now_ns
+        if number == 70:
+            started.shared.post(request)
+            if release:
+                tick.release()
+
+    started.run(each_tick, 200)
+    assert EventCode.SWITCHED in [event.code for event in started.told]
+    assert EventCode.LOOP_LATE not in [event.code for event in started.told]
 
 
 def test_an_event_before_the_first_tick_has_the_time_that_it_is(started: Started) -> None:

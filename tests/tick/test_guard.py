@@ -220,6 +220,33 @@ def test_a_raised_limit_goes_up_by_a_ramp() -> None:
     assert max(b - a for a, b in itertools.pairwise(forces)) == pytest.approx(0.5)
 
 
+def test_limits_that_begin_to_move_after_the_last_tick_do_not_count_what_passed_before() -> None:
+    """And a release does, whose force was held; what a tick was not told in time counts for no later one."""
+    made = armed(max_force_n=8.0)
+    made.reduce([5.0], PERIOD_S)
+    made.configure(SafetyConfig(max_force_n=3.0), device(), [5.0])
+    made.begin_late(0.02)
+    made.reduce([5.0], PERIOD_S + 0.02)
+    assert made.max_force_n == pytest.approx(5.0 - 2.0 / 50)
+    made.reduce([5.0], PERIOD_S)
+    assert made.max_force_n == pytest.approx(5.0 - 4.0 / 50)
+    made.release(0.05)
+    made.begin_late(0.02)
+    made.reduce([5.0], PERIOD_S + 0.02)
+    assert made.gain == pytest.approx(1.0 - 21 / 50)
+    made.configure(SafetyConfig(max_force_n=8.0), device(), [5.0])
+    before_n = made.max_force_n
+    made.begin_late(0.02)
+    made.reduce([5.0], PERIOD_S)  # of an arming the first tick counts one period at most
+    assert made.max_force_n == before_n
+    made = armed(max_force_n=8.0)
+    made.reduce([5.0], PERIOD_S)
+    made.begin_late(0.02)  # nothing moves
+    made.configure(SafetyConfig(max_force_n=3.0), device(), [5.0])
+    made.reduce([5.0], PERIOD_S)
+    assert made.max_force_n == pytest.approx(5.0 - 2.0 / 50)
+
+
 def test_limits_that_return_from_simulation_start_from_the_force_in_use() -> None:
     info = device(math.inf, simulated=True)
     made = armed(info, profile="simulation")

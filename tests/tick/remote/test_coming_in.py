@@ -100,6 +100,31 @@ def test_the_books_balance_as_it_comes_in_under_a_hand_that_moves() -> None:
     assert abs(rig.energy_j) > 1e-4
 
 
+@pytest.mark.parametrize("enable_s", [0.0, 0.02, 0.09])
+def test_it_comes_in_with_the_first_tick_after_arming_however_late_that_is(enable_s: float) -> None:
+    """What the device took to let forces through was counted as the ramp's: 0.8 N of 2 came at once."""
+    rig = Rig(COUPLING + PROMPT, arm=False, simulated=False, host_silence_ms=20.0)
+    pulled(rig, 2 * FOLLOWED)
+    assert rig.tick.arm()
+    rig.say("tool", position_m=[OFF_M])
+    force = [*rig.go(dt_s=PERIOD_S + enable_s), *pulled(rig, RAMP_TICKS)]
+    assert force == pytest.approx([K * OFF_M * tick / RAMP_TICKS for tick in range(RAMP_TICKS + 1)], rel=1e-4)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 0.02, 0.04])
+def test_another_law_of_it_comes_in_once_that_has_started_however_long_that_took(start_s: float) -> None:
+    rig = Rig(COUPLING + PROMPT, simulated=False, host_silence_ms=20.0)
+    pulled(rig, 2 * FOLLOWED)
+    held_n = rig.force[0]
+    for axis in rig.tick.own_ports.axes:
+        axis.law.step = lambda *_: 0.0
+        rig.tick._blend(axis)
+    rig.tick.begin_late(start_s)
+    rig.say("tool", position_m=[OFF_M])
+    force = [*rig.go(dt_s=PERIOD_S + start_s), *pulled(rig, RAMP_TICKS)]
+    assert force == pytest.approx([held_n * (1.0 - tick / RAMP_TICKS) for tick in range(RAMP_TICKS + 1)], abs=1e-9)
+
+
 def test_a_time_shorter_than_the_ramp_leaves_the_ramp() -> None:
     force = pulled(Rig(COUPLING + "come_in_s = 0.01\n"), 200)
     plain = pulled(Rig(COUPLING + PROMPT), 200)

@@ -6,11 +6,13 @@ import dataclasses
 import math
 from contextlib import nullcontext
 from itertools import pairwise
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 from hapticd import plugins
+from hapticd.config.safety import SafetyConfig
 from hapticd.errors import ConfigError
 from hapticd.law import LawSnapshot
 from hapticd.tick import fallback
@@ -20,6 +22,8 @@ from tests.tick.space import nonsense, passing_fault
 from tests.tick.space.rig import INFO, Rig, apart, ball, config, length, table
 
 RAMP_TICKS = 50
+REAL = dataclasses.replace(INFO, simulated=False, host_silence_ms=20.0)
+AT = (0.0, 0.0, 0.0292)
 
 
 def pressed(scene: str = "", law: str = "energy-cycle") -> Rig:
@@ -265,6 +269,62 @@ def test_a_law_that_fails_on_an_object_is_replaced_and_the_force_let_out() -> No
     assert loaded.law is not contact.normal.law.module
 
 
+def come_in(rig: Rig, first_s: float) -> list[float]:
+    """The force along z on a device that stands still: after a tick that comes so late, and then in time."""
+    found = []
+    for tick in range(RAMP_TICKS + 10):
+        passed_s = 1e-3 if tick else first_s
+        rig.sample.time_ns += round(passed_s * 1e9)
+        found.append(rig.tick.advance(rig.sample, passed_s)[2])
+    return found
+
+
+@pytest.mark.parametrize("enable_s", [0.0, 0.02, 0.09])
+def test_an_object_comes_in_with_the_first_tick_after_arming_however_late_that_is(enable_s: float) -> None:
+    """As a wall does: 1.6 N of 4 in the first tick, where the device took 20 ms to let forces through."""
+    rig = Rig(ball(), "none", info=REAL).start((0.0, 0.0, 0.031)).to(AT, 60)
+    rig.tick.guard.drop()
+    rig.go(AT)
+    assert rig.tick.arm()
+    steps = [4.0 * min(tick / RAMP_TICKS, 1.0) for tick in range(RAMP_TICKS + 10)]
+    assert come_in(rig, 1e-3 + enable_s) == pytest.approx(steps)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 0.02, 0.04])
+@pytest.mark.parametrize("after_n", [2.0, 0.0, 8.0], ids=["softer", "gone", "stiffer"])
+def test_an_object_changes_from_when_the_change_is_ready_and_not_from_the_tick_before(
+    start_s: float, after_n: float
+) -> None:
+    """What it took to start laws was counted as the ramp's."""
+    rig = Rig(ball(), "none", info=REAL).start((0.0, 0.0, 0.031)).to(AT, 60).go(*(5 * [AT]))
+    rig.switch(ball(stiffness=after_n / 8e-4) if after_n else "", "damper")
+    rig.tick.begin_late(start_s)
+    steps = [4.0 + (after_n - 4.0) * min(tick / RAMP_TICKS, 1.0) for tick in range(RAMP_TICKS + 10)]
+    assert come_in(rig, 1e-3 + start_s) == pytest.approx(steps, abs=1e-12)
+
+
+def test_a_ramp_that_is_under_way_counts_the_time_that_another_request_takes() -> None:
+    rig = Rig(ball(), "none", info=REAL).start((0.0, 0.0, 0.031)).to(AT, 60).go(*(5 * [AT]))
+    rig.switch(ball(stiffness=2500.0)).go(*(11 * [AT]))
+    assert rig.force[2] == pytest.approx(4.0 - 2.0 * 10 / RAMP_TICKS)
+    rig.tick.begin_late(0.02)
+    assert come_in(rig, 0.021)[0] == pytest.approx(4.0 - 2.0 * 31 / RAMP_TICKS)
+
+
+def test_what_a_request_takes_is_nothing_to_a_simulated_device_nor_to_one_that_was_never_armed() -> None:
+    """A ramp of the one goes by ticks, so that a run can be repeated; and the other has none."""
+    fast, slow = (pressed(law="none") for _ in range(2))
+    for rig in (fast, slow):
+        for _ in rig.tick.switch(config(ball(stiffness=9000.0)).config.scene, SafetyConfig(max_force_n=2.0)):
+            pass
+    slow.tick.begin_late(0.02)
+    assert come_in(slow, 1e-3) == come_in(fast, 1e-3)
+    never = make_tick(config(ball()), REAL)
+    never.start(fast.sample)
+    never.begin_late(0.02)
+    assert never.advance(fast.sample, 1e-3) == [0.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize("at", [0, 1], ids=["a wall's", "an object's"])
 def test_the_law_that_failed_is_named_and_no_other(at: int) -> None:
     """The first contact's was, whichever had failed: the way back is to mend it."""
@@ -274,6 +334,28 @@ def test_the_law_that_failed_is_named_and_no_other(at: int) -> None:
     failing.law = RunningLaw(nonsense, nonsense.Params())
     rig.go((0.0, 0.0, 0.0291))
     assert rig.tick.fault_text == "law tests.tick.space.nonsense: ArithmeticError: nan is not a possible number"
+
+
+@pytest.mark.parametrize("channel", [0, 1, 2], ids=["across", "along", "along as well"])
+def test_it_is_named_in_each_direction_of_an_object(channel: int) -> None:
+    rig = pressed(ball(static_friction=0.5, dynamic_friction=0.4), "damper")
+    rig.tick.solids[0].channels[channel].law = RunningLaw(nonsense, nonsense.Params())
+    for each in rig.tick.solids[0].channels[:channel]:
+        each.law = rig.tick.solids[0].channels[channel].law.another()
+    rig.go((0.0001, 0.0, 0.0291))
+    assert rig.tick.fault_text == "law tests.tick.space.nonsense: ArithmeticError: nan is not a possible number"
+
+
+def test_a_law_that_builds_on_the_one_of_a_wall_is_named_where_it_fails_on_an_object() -> None:
+    """The wall's was, since it was in the middle of it."""
+    builds = ModuleType("lab.builds")
+    builds.__dict__.update(passing_fault.__dict__, __name__="lab.builds", step=passing_fault.step)
+    wall = '[[scene.walls]]\naxis = "z"\nstiffness_n_per_m = 100.0\nposition_m = -0.5\n'
+    rig = pressed(wall + ball(), "damper")
+    rig.tick.contacts[0].law = RunningLaw(passing_fault, passing_fault.Params())
+    rig.tick.solids[0].normal.law = RunningLaw(builds, builds.Params())
+    rig.go((0.0, 0.0, 0.0291))
+    assert rig.tick.fault_text.startswith("law lab.builds: ZeroDivisionError: as it happens")
 
 
 def test_what_comes_while_the_fallback_is_in_force_has_it_too_until_the_device_is_armed() -> None:
