@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hapticd.config.safety import SafetyConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError
-from hapticd.tick.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, blended, blended_again, start_blend
+from hapticd.tick.guard import DEFAULT_MAX_SPEED_M_PER_S, Guard, Mode, begin_late, blended, blended_again, start_blend
 
 PERIOD_S = 1e-3
 FORCES = st.lists(st.floats(-1e18, 1e18), min_size=1, max_size=3)
@@ -218,6 +218,19 @@ def test_a_raised_limit_goes_up_by_a_ramp() -> None:
     forces += written(made, 100.0, 30)
     assert forces[-1] == pytest.approx(12.0)
     assert max(b - a for a, b in itertools.pairwise(forces)) == pytest.approx(0.5)
+
+
+def test_a_blend_that_begins_late_does_not_count_what_passed_before_and_one_that_has_begun_does() -> None:
+    for first in (0, 1):
+        state = SimpleNamespace()
+        start_blend(state, 0.0, -1.0, 12.0, 50)
+        begin_late(state, 20.0)
+        assert blended(state, -1.0, 10.0, 21.0 + first) == pytest.approx(10.0 * first / 50)
+        begin_late(state, 20.0)
+        assert blended(state, -1.0, 10.0, 21.0) == pytest.approx(10.0 * (first + 21) / 50)
+    state = SimpleNamespace(blending=False, blend_tick=-1.0)
+    begin_late(state, 20.0)
+    assert state.blend_tick == -1.0
 
 
 def test_limits_that_begin_to_move_after_the_last_tick_do_not_count_what_passed_before() -> None:
