@@ -31,8 +31,9 @@ def hapkit_table(
     """Measure the angle table of a Hapkit while you swing its handle.
 
     An uneven magnet makes positions wave by a part of a millimetre, the same over each half turn of the motor's shaft.
-    Swing the handle to and fro over its whole travel, about twice a second, until the bar is full. The motor gets no
-    force, and no ruler is needed. End a daemon that has the port first.
+    Swing the handle to and fro over most of its travel, about twice a second, until the bar is full; turn a little
+    elsewhere each time, and not at the stops. The motor gets no force, and no ruler is needed. End a daemon that has
+    the port first.
 
     Example: hapticd hapkit-table --board hapkit/board.h --write
     """
@@ -52,9 +53,9 @@ def hapkit_table(
         raise ConfigError(f"{header}: {getattr(error, 'strerror', None) or error}") from None
     where = choose(port)
     typer.echo(
-        "The motor gets no force. Switch its supply off, take the handle, and swing it to and fro over its", err=True
+        "The motor gets no force. Switch its supply off, take the handle, and swing it to and fro over most", err=True
     )
-    typer.echo("whole travel, about twice a second, without stopping on the way, until the bar is full.", err=True)
+    typer.echo("of its travel, about twice a second, turning elsewhere each time, until the bar is full.", err=True)
     with progress_bar(ENOUGH_PASSES, "half turns") as tell:
         found = measure(where, baud, before, longest, lambda more: tell(advance=more))
     if write:

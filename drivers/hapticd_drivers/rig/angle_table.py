@@ -34,7 +34,8 @@ class AngleTable:
     Attributes:
         nodes: the table for the board, in counts.
         passes: half turns that it rests on.
-        error_counts: standard error of the least certain node.
+        error_counts: standard error of the least certain node. A hand that jerks round at the same place each time adds
+            an error of its own that this does not show: 4 counts at most, 2 if the place changes.
         uneven_counts: largest error of what the table before shows.
     """
 

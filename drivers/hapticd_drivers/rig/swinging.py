@@ -69,6 +69,6 @@ def _watch(talk: Conversation, swings: Swings, longest_s: float, told: Callable[
         error = "nothing" if found is None else f"its worst number to {found.error_counts:.1f} counts"
         raise HapticdError(
             f"the table is not known after {longest_s:g} s: {swings.passes} half turns could be used, and they tell "
-            f"{error}. Swing the handle over its whole travel, about twice a second, without stopping on the way"
+            f"{error}. Swing the handle over most of its travel, about twice a second, without stopping on the way"
         )
     return found
