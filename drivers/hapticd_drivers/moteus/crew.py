@@ -37,6 +37,9 @@ _BACKWARDS = 0x80000000  # of a difference of two counts of milliseconds, which 
 _LOOK_S = 0.005
 _WITHOUT_FORCE = (STOPPED, FAULTED, BRAKE)
 
+SAME_TURNS = 2.0 / 16384
+"""A controller whose home moves by less shows no difference: two counts of its encoder [turns]."""
+
 PREPARING_S = 0.3
 """For this time after it was enabled a controller may get ready, in which it gives no torque [s]."""
 
@@ -45,7 +48,7 @@ class MoteusMotor(Motor):
     """What is known of a controller and its motor.
 
     Attributes:
-        restarted: it has been switched off and on, and nobody has yet asked whether it knows its home.
+        restarted: it was switched off and on after the driver last looked whether it knows its home.
         most_n_m: torque that it may apply [N m].
         mode, fault, home_state: its registers.
         firmware, serial: what it is; "" until it has said so.
@@ -127,7 +130,7 @@ class MoteusCrew(Crew):
         self._say_until(self._send_no_torque, self._follows, urgent=True)
 
     def accept_restarts(self) -> None:
-        """Go on with those that were switched off and on."""
+        """Forget who was switched off and on: the driver has looked whether all still know their home."""
         for motor in self._motors:
             motor.restarted = False
 
@@ -177,7 +180,7 @@ class MoteusCrew(Crew):
         def taken(index: int) -> bool:
             """Whether it counts anew; its home state may speak of an older home."""
             now = motors[index].turns
-            return motors[index].heard and abs(now - after[index]) <= abs(now - before[index])
+            return motors[index].heard and abs(now - after[index]) <= max(abs(now - before[index]), SAME_TURNS)
 
         refusal = DeviceProtocolError(f"{self._name}: a controller on {self.link.where} has not taken its home")
         try:

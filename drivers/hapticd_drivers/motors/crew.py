@@ -115,7 +115,7 @@ class Crew(ABC):
 
     @abstractmethod
     def accept_restarts(self) -> None:
-        """Know that whoever was switched off and on until now has been taken for one whose home is to be looked at."""
+        """Forget who was switched off and on: the driver has looked whether all still know their home."""
 
     @abstractmethod
     def ask(self) -> None:

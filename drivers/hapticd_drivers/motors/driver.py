@@ -11,7 +11,6 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverState
 from hapticd.errors import (
     ConfigError,
-    DeviceFaultError,
     DeviceProtocolError,
     DeviceTimeoutError,
     DriverError,
@@ -26,6 +25,7 @@ from hapticd_drivers.motors.metrics import METRICS, TICKS_WITHOUT_STATE
 from hapticd_drivers.motors.mover import COUNTS_PER_TURN, MotorMover
 from hapticd_drivers.motors.options import MotorOptions, refuse_axes
 from hapticd_drivers.rig import motion
+from hapticd_drivers.rig.sign import Sign
 
 PATIENCE = 0.25
 """Share of the period for which a tick waits for states that are late."""
@@ -67,7 +67,7 @@ class MotorDriver(Driver[MotorOptionsT]):
         self._most_silent = max(SILENT_TICKS, round(SILENCE_S / period_s))
         self._restarted_ticks = round(RESTARTED_S / period_s)
         self._silent = 0
-        self._sign_checked = options.sign_checked
+        self._sign = Sign(self.NAME, options.sign_checked)
         self._lock = threading.Lock()  # a calibration talks to the motors beside the loop
 
     @classmethod
@@ -112,7 +112,7 @@ class MotorDriver(Driver[MotorOptionsT]):
         for drum, motor in zip(self._drums, crew.motors, strict=True):
             options = drum.options
             if crew.absolute or options.homing == "absolute":
-                drum.put(0.0, _home_m(drum))
+                drum.put(0.0, options.home_m)
                 drum.homed = True
             else:  # it has been switched off perhaps: its middle will do until it is calibrated
                 drum.put(motor.turns, 0.5 * (options.lowest_m + options.highest_m))
@@ -152,12 +152,7 @@ class MotorDriver(Driver[MotorOptionsT]):
                 f"{self.NAME}: it is not known where the handle is: clear its workspace, then `hapticd calibrate`, "
                 "which moves the arm"
             )
-        if not self._sign_checked:
-            raise DriverStateError(
-                f"{self.NAME}: it has not been checked that the motors push the right way: clear the workspace, then "
-                "`hapticd calibrate`, which moves the arm; once it has passed, device.options.sign_checked = true "
-                "says so for good"
-            )
+        self._sign.demand()
         with self._lock:
             self._opened().enable()
             self._silent = 0
@@ -225,7 +220,7 @@ class MotorDriver(Driver[MotorOptionsT]):
             position_m[index] = drum.position_m(motor.turns)
             velocity_m_per_s[index] = drum.turn_m * motor.turns_per_s
         sample.sequence += 1
-        sample.calibrated = self._sign_checked and all(drum.homed for drum in self._drums)
+        sample.calibrated = self._sign.checked and all(drum.homed for drum in self._drums)
 
     def _forget_home(self) -> None:
         """A controller has been switched off and on, as far as can be told, or was never told where home is."""
@@ -253,7 +248,9 @@ class MotorDriver(Driver[MotorOptionsT]):
                     self._calibrate_axis(mover, index)
             finally:
                 crew.disable()
-            homes = [None if drum.options.homing == "absolute" else drum.turns(_home_m(drum)) for drum in self._drums]
+            homes = [
+                None if drum.options.homing == "absolute" else drum.turns(drum.options.home_m) for drum in self._drums
+            ]
             try:
                 crew.set_home(homes)
             except DriverError:
@@ -261,8 +258,8 @@ class MotorDriver(Driver[MotorOptionsT]):
                 raise
             if crew.absolute:
                 for drum in self._drums:
-                    drum.put(0.0, _home_m(drum))
-            self._sign_checked = True
+                    drum.put(0.0, drum.options.home_m)
+            self._sign.checked = True
             self._accept()
             crew.ask()
 
@@ -281,11 +278,7 @@ class MotorDriver(Driver[MotorOptionsT]):
             count_m=drum.resolution_m,
             span_m=options.highest_m - options.lowest_m,
         )
-        try:
-            motion.check_sign(drive)
-        except DeviceFaultError:  # what was believed before, or the options say, has just been disproved
-            self._sign_checked = False
-            raise
+        self._sign.check(drive)
         if options.homing == "absolute":
             return
         if options.homing == "here":
@@ -303,11 +296,6 @@ class MotorDriver(Driver[MotorOptionsT]):
 def _end_m(drum: Drum) -> float:
     options = drum.options
     return options.highest_m if options.homing == "high_stop" else options.lowest_m
-
-
-def _home_m(drum: Drum) -> float:
-    """Where a controller that remembers its home counts from [m]."""
-    return drum.options.home_m if drum.options.homing in ("here", "absolute") else _end_m(drum)
 
 
 _ENABLED = DriverState.ENABLED  # Python 3.11 takes 0.1 us to look a member up, each time

@@ -31,7 +31,11 @@ class DrumOptions(Table):
         1.0, gt=0.0, le=1000.0, description="turns of the shaft that the controller reports for one turn of the drum"
     )
     home_m: float = Field(
-        0.0, ge=-10.0, le=10.0, description='position of the home, with homing = "here" or "absolute" [m]'
+        0.0,
+        ge=-10.0,
+        le=10.0,
+        description='position that a controller counts from: with homing = "here" that of the handle in a calibration, '
+        'with "absolute" that of turn 0 of the encoder [m]',
     )
     homing: Literal["low_stop", "high_stop", "here", "absolute"] = Field(
         "low_stop",

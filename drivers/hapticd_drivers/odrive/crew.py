@@ -123,7 +123,7 @@ class OdriveCrew(Crew):
         self._enabled_ns = time.monotonic_ns()
 
     def accept_restarts(self) -> None:
-        """None is told of: one that was switched off and on is known by its silence."""
+        """Nothing to forget: an ODrive that was switched off and on is noticed by its silence."""
 
     def disable(self) -> None:
         """Let go, until all have said that they have."""

@@ -27,6 +27,7 @@ from hapticd_drivers.rig.messages import ENABLED, HAS_HOME_SWITCH, HOMED, KNOWS_
 from hapticd_drivers.rig.metrics import METRICS, ROUND_TRIP_US, TICKS_WITHOUT_STATE
 from hapticd_drivers.rig.mover import RigMover
 from hapticd_drivers.rig.options import AxisOptions, RigOptions
+from hapticd_drivers.rig.sign import Sign
 from hapticd_drivers.rig.traced_link import TracedLink
 
 PATIENCE = 0.25
@@ -78,7 +79,7 @@ class RigDriver(Driver[RigOptionsT]):
         self._until_counts = 0
         self._button_bits = 0
         self._homed = False
-        self._sign_checked = options.sign_checked
+        self._sign = Sign(self.NAME, options.sign_checked)
         self._lock = threading.Lock()  # a calibration talks to the rig beside the loop
         self._knows_home = False
 
@@ -182,12 +183,7 @@ class RigDriver(Driver[RigOptionsT]):
                 f"{self.NAME}: the rig does not know where it is since it was switched on: clear its workspace, then "
                 "`hapticd calibrate`, which moves the arm"
             )
-        if not self._sign_checked:
-            raise DriverStateError(
-                f"{self.NAME}: nobody has checked that the motor pushes the right way: clear the workspace, then "
-                "`hapticd calibrate`, which moves the arm; once it has passed, device.options.sign_checked = true "
-                "says so for good"
-            )
+        self._sign.demand()
         with self._lock:
             self._let_forces_through(urgent=True)
 
@@ -260,7 +256,7 @@ class RigDriver(Driver[RigOptionsT]):
         self._sequence = state.sequence
         sample.buttons = state.buttons & self._button_bits
         self._homed = bool(state.flags & HOMED)  # a rig that has lost counts forgets its home
-        sample.calibrated = self._homed and self._sign_checked
+        sample.calibrated = self._homed and self._sign.checked
         position_m = sample.position_m
         for index, axis in enumerate(self._maps):
             position_m[index] = axis.position_m(state.position[index])
@@ -302,7 +298,7 @@ class RigDriver(Driver[RigOptionsT]):
                 if home is not None:
                     talk.set_home(index, home)
                     self._maps[index].put_home(home)
-            self._sign_checked = True
+            self._sign.checked = True
             self._accept(talk.state())
             talk.poll(self._answer_after_us)
 
@@ -322,11 +318,7 @@ class RigDriver(Driver[RigOptionsT]):
             count_m=abs(axis.count_m),
             span_m=axis.highest_m - axis.lowest_m,
         )
-        try:
-            motion.check_sign(drive)
-        except DeviceFaultError:  # what was believed before, or the options say, has just been disproved
-            self._sign_checked = False
-            raise
+        self._sign.check(drive)
         if self._knows_home:
             return None
         match self._axis_options(index).homing:

@@ -120,7 +120,7 @@ class SpaceTick(ControlTick):
             yield from switch.to_law(make_law)
 
         def start() -> None:
-            if not self.has_objects:  # until now nobody has kept it
+            if not self.has_objects:  # it is kept up only while there are objects
                 x, y, z = self.motion.position_m
                 self.at_m = (x, y, z)
             for contact in switch.new:

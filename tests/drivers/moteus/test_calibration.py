@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverStateError
 from hapticd_drivers.motors import crew
 from hapticd_drivers.rig import motion
+from tests.drivers.moteus.controller import COUNTS_PER_TURN
 from tests.drivers.moteus.lab import Lab, axes
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
@@ -64,6 +66,21 @@ def test_it_finds_the_stop_and_the_controllers_remember_home(bench: Lab) -> None
     again.close()
 
 
+@pytest.mark.parametrize("before", ["low_stop", "high_stop", "here"])
+@pytest.mark.parametrize("after", ["low_stop", "high_stop", "here"])
+def test_a_home_that_is_remembered_means_the_same_when_it_would_be_found_otherwise(
+    bench: Lab, before: str, after: str
+) -> None:
+    home_m = bench.first.shaft.x_m if before == "here" else 0.02
+    with opened(bench, homing=before, home_m=home_m) as driver:
+        driver.calibrate()
+    with bench.driver(axes=axes(1, homing=after, home_m=home_m)) as again:
+        again._state_wait_s = PATIENCE_S
+        sample = again.read()
+        assert sample.calibrated
+        assert sample.position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=2e-4)
+
+
 def lose_homes(bench: Lab, monkeypatch: pytest.MonkeyPatch, most: int) -> list[bytes]:
     """Lose this many of the frames that tell the controller its home; those that were lost so far."""
     hear, lost = bench.first.hear, list[bytes]()
@@ -89,6 +106,17 @@ def test_a_home_that_was_lost_on_the_way_is_told_again(bench: Lab, monkeypatch: 
         motors.set_home([motors.motors[0].turns])
         assert len(lost) == 1
         assert motors.motors[0].turns == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("part_of_a_count", [0.0, 0.3, 0.7])
+def test_a_home_that_is_where_it_was_is_taken(bench: Lab, part_of_a_count: float) -> None:
+    """As in a second calibration; places come in whole counts of the encoder."""
+    bench.first.shaft.x_m = (-9000 + part_of_a_count) / COUNTS_PER_TURN * 2.0 * math.pi * RADIUS_M
+    with bench.driver(axes=axes(1)) as driver:
+        motors = driver._opened()
+        for _ in range(3):
+            motors.set_home([motors.motors[0].turns])
+            assert motors.motors[0].turns == pytest.approx(0.0, abs=1.0 / COUNTS_PER_TURN)
 
 
 def test_a_home_that_is_not_taken_leaves_none(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,7 +155,7 @@ def test_a_motor_that_pushes_the_wrong_way_is_refused(bench: Lab) -> None:
 
 
 def test_a_controller_that_restarts_just_before_it_is_armed_is_refused(bench: Lab) -> None:
-    """Nobody had looked since: its answer to the arming showed it, and was believed to be at home 50 mm from there."""
+    """It counts from 50 mm away; its answer to the arming is the first to show that it was switched off and on."""
     driver = opened(bench)
     driver.calibrate()
     driver.enable()

@@ -100,7 +100,7 @@ def test_a_sign_that_a_calibration_has_disproved_is_believed_no_more(rig: Rig, m
     rig.plant.motor = -1.0
     with pytest.raises(DeviceFaultError, match="motor_reversed"):
         driver.calibrate()
-    with pytest.raises(DriverStateError, match="nobody has checked that the motor pushes the right way"):
+    with pytest.raises(DriverStateError, match="has not been checked that the motors push the right way"):
         driver.enable()
 
 

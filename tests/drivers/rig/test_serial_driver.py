@@ -36,7 +36,7 @@ def test_a_rig_whose_sign_nobody_has_checked_takes_no_force(rig: Rig, make_drive
     rig.set_home()
     driver = make_driver()
     driver.open()
-    with pytest.raises(DriverStateError, match="pushes the right way"):
+    with pytest.raises(DriverStateError, match="push the right way"):
         driver.enable()
     assert not driver.read().calibrated
 
