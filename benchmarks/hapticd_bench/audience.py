@@ -109,7 +109,7 @@ class _Page(threading.Thread):
 
     def _take(self, frame: bytes) -> None:
         while frame:
-            ticks, axes, _, first = HEADER.unpack_from(frame)
+            ticks, axes, _, first, _ = HEADER.unpack_from(frame)
             columns = 2 + 3 * axes + 7
             numbers = struct.unpack_from(f"<{ticks}f", frame, HEADER.size + 4 * ticks)
             for number in numbers:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import os
 import signal
@@ -63,18 +64,31 @@ while not enough() and time.monotonic() < end:
 print(json.dumps({name: [inlet.info(5.0).as_xml(), *kept[name]] for name, inlet in zip(("ticks", "events"), inlets)}))
 """
 
+# Keeps its inlet, as LabRecorder does, until ticks come ten apart; then looks for the stream as one that comes anew.
+RELOADED = """
+import json, time
+import pylsl
+def find():
+    return pylsl.resolve_byprop("name", "hapticd-default-ticks", timeout=60.0)[0]
+first = find()
+inlet = pylsl.StreamInlet(first, max_buflen=60, recover=True)
+inlet.open_stream(timeout=60.0)
+print("open", flush=True)
+seqs = []
+end = time.monotonic() + 60.0
+while not (len(seqs) > 20 and seqs[-1] - seqs[-21] == 200) and time.monotonic() < end:
+    samples, _ = inlet.pull_chunk(timeout=0.1)
+    seqs.extend(sample[0] for sample in samples)
+print(json.dumps({"rates_hz": [first.nominal_srate(), find().nominal_srate()], "twenty_ticks": seqs[-1] - seqs[-21]}))
+"""
+
 
 @pytest.fixture(scope="module")
 def streamed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """A daemon, the bridge, a reader of both streams, and a subscriber beside them."""
     folder = tmp_path_factory.mktemp("lsl")
-    (folder / "lsl_api.cfg").write_text(LOOPBACK)
     with Daemon((CONFIG / "hapticd.toml").read_text()).wait_ready() as daemon:
-        environment = {
-            **os.environ,
-            "HAPTICD_RUNTIME_DIR": str(daemon.directory / "run"),
-            "LSLAPICFG": str(folder / "lsl_api.cfg"),
-        }
+        environment = surroundings(daemon, folder)
         bridge_command = [HAPTICD, "lsl", "--json"]
         reader_command = [sys.executable, "-c", READER.replace("TICKS", str(TICKS))]
         with running(bridge_command, environment) as bridge, running(reader_command, environment) as reader:
@@ -96,6 +110,14 @@ def streamed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any
             **json.loads(told), "deadlines_ns": deadlines_ns, "said": json.loads(said), "warned": warned,
             "code": bridge.returncode, "doctor": open_to_all,
         }  # fmt: skip
+
+
+def surroundings(daemon: Daemon, folder: Path) -> dict[str, str]:
+    """The environment of the bridge and of its readers; what liblsl reads lies in the folder."""
+    configuration = folder / "lsl_api.cfg"
+    configuration.write_text(LOOPBACK)
+    runtime = str(daemon.directory / "run")
+    return {**os.environ, "HAPTICD_RUNTIME_DIR": runtime, "LSLAPICFG": str(configuration)}
 
 
 @contextlib.contextmanager
@@ -163,6 +185,21 @@ def test_an_xdf_file_of_the_streams_has_every_tick(streamed: dict[str, Any], tmp
     assert ticks["time_series"].tolist() == streamed["ticks"][1]
     assert ticks["time_stamps"].tolist() == streamed["ticks"][2]
     assert any("go <1>" in text for (text,) in events["time_series"])
+
+
+def test_after_a_reload_of_every_ticks_the_stream_has_the_new_rate_and_its_reader_goes_on(tmp_path: Path) -> None:
+    """A stream cannot change its rate while it lives."""
+    config = (CONFIG / "hapticd.toml").read_text()
+    with Daemon(config).wait_ready() as daemon:
+        environment = surroundings(daemon, tmp_path)
+        with running([HAPTICD, "lsl"], environment), running([sys.executable, "-c", RELOADED], environment) as reader:
+            assert reader.stdout is not None
+            assert reader.stdout.readline() == "open\n"
+            daemon.config.write_text(config.replace("[telemetry]\n", "[telemetry]\nevery_ticks = 10\n"))
+            assert daemon.ask("reload") == ""
+            told, complained = reader.communicate(timeout=3 * PATIENCE_S)
+            assert reader.returncode == 0, complained
+    assert json.loads(told) == {"rates_hz": [1000.0, 100.0], "twenty_ticks": 200.0}
 
 
 def test_it_is_said_that_everybody_can_listen(streamed: dict[str, Any]) -> None:
@@ -244,6 +281,16 @@ def test_a_wall_that_is_added_makes_new_streams(kept: list[Kept]) -> None:
     assert [len(outlets.ticks) for outlets in kept] == [2, 1]
     assert kept[1].layout.walls == 2
     assert bridge.streamed.layouts == 2
+
+
+def test_another_rate_makes_new_streams(kept: list[Kept]) -> None:
+    bridge = Bridge()
+    bridge.take([*tick(0), *tick(1)], STATUS)
+    thinned = dataclasses.replace(STATUS, every_ticks=10)
+    bridge.take([thinned], thinned)
+    bridge.take([*tick(10), *tick(20)], thinned)
+    assert [outlets.layout.rate_hz for outlets in kept] == [1000.0, 100.0]
+    assert [len(outlets.ticks) for outlets in kept] == [2, 2]
 
 
 def test_what_is_missing_is_told(kept: list[Kept]) -> None:

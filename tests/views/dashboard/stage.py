@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Sequence
 
+from hapticd.config.models import TelemetryConfig
 from hapticd.telemetry.records import Status
 from hapticd.telemetry.wire import SCHEMA
 from hapticd.tick.event import LoopEvent
@@ -23,7 +24,9 @@ class Stage:
 
     def __init__(self) -> None:
         self._wire = Wire(say_status=False)
-        self._play: queue.Queue[list[TickRecord] | LoopEvent | int | tuple[str, object]] = queue.Queue()
+        self._play: queue.Queue[list[TickRecord] | LoopEvent | TelemetryConfig | int | tuple[str, object]] = (
+            queue.Queue()
+        )
         self._status = Status(version="1.2.3", law="energy-cycle", rate_hz=1000.0, axes=("z",)).as_map()
         self._over = threading.Event()
         self.endpoint = self._wire.endpoint
@@ -49,6 +52,10 @@ class Stage:
         """Have an event published."""
         self._play.put(event)
 
+    def reload(self, every_ticks: int) -> None:
+        """Have one tick in this many published, behind those before, and a status that says so."""
+        self._play.put(TelemetryConfig(every_ticks=every_ticks))
+
     def speak(self, schema: int) -> None:
         """Have statuses of this schema published, now and from now on."""
         self._play.put(schema)
@@ -71,6 +78,9 @@ class Stage:
                     publisher.flush(time.monotonic_ns() + 10**18)
                 case LoopEvent():
                     publisher.event(item)
+                case TelemetryConfig():
+                    publisher.reconfigure(item)
+                    due_s = 0.0
                 case (str(topic), payload):
                     self._wire.say(topic, payload)
                 case int():

@@ -29,7 +29,7 @@ def parts(seq: int, axes: int = 1) -> list[Part]:
 def joined(*given: Part) -> TickJoiner:
     joiner = TickJoiner()
     for part in given:
-        joiner.add(part)
+        joiner.add(part, 1)
     return joiner
 
 
@@ -37,14 +37,14 @@ def unpacked(frames: bytes) -> list[dict[str, Any]]:
     """Every frame of a message."""
     found, at = [], 0
     while at < len(frames):
-        count, axes, t0, seq0 = HEADER.unpack_from(frames, at)
+        count, axes, t0, seq0, step = HEADER.unpack_from(frames, at)
         at += HEADER.size
         names = ["t", "seq", *(f"{name}{axis}" for name in COLUMNS_OF_AN_AXIS for axis in range(axes)), *COLUMNS]
         columns = {}
         for name in names:
             columns[name] = list(struct.unpack_from(f"<{count}f", frames, at))
             at += 4 * count
-        found.append({"axes": axes, "t0": t0, "seq0": seq0, **columns})
+        found.append({"axes": axes, "t0": t0, "seq0": seq0, "step": step, **columns})
     return found
 
 
@@ -71,7 +71,7 @@ def test_a_tick_has_what_was_published_of_it() -> None:
 def test_a_tick_waits_for_all_of_its_parts_in_whatever_order_they_come() -> None:
     joiner = joined(*parts(1)[:3], *reversed(parts(0)))
     assert [tick.seq for tick in joiner.take()] == [0]
-    joiner.add(parts(1)[3])
+    joiner.add(parts(1)[3], 1)
     assert [tick.seq for tick in joiner.take()] == [1]
     assert joiner.take() == []
 
@@ -87,7 +87,7 @@ def test_a_part_that_is_lost_leaves_a_hole_in_its_columns_only() -> None:
 def test_a_topic_that_never_comes_does_not_pile_up() -> None:
     joiner, taken = TickJoiner(), 0
     for seq in range(3 * MOST_WAITING):
-        joiner.add(parts(seq)[0])
+        joiner.add(parts(seq)[0], 1)
         if seq % 200 == 0:
             taken += len(joiner.take())
     assert taken >= 2 * MOST_WAITING
@@ -99,16 +99,31 @@ def test_a_daemon_that_starts_anew_is_followed_from_its_first_tick(first: int) -
     assert [tick.seq for tick in joiner.take()] == [5000]
     joiner.restart(Gap(Topic.POSITION, 5001, first, 0))
     for part in parts(first):
-        joiner.add(part)
+        joiner.add(part, 1)
     joiner.restart(Gap(Topic.TIMING, 5000, first, 0))
     for part in parts(first + 1):
-        joiner.add(part)
+        joiner.add(part, 1)
     assert [tick.seq for tick in joiner.take()] == [first, first + 1]
 
 
 def test_another_number_of_axes_begins_another_frame() -> None:
     frames = unpacked(packed(joined(*parts(0), *parts(1, axes=3), *parts(2, axes=3)).take()))
     assert [(frame["axes"], len(frame["t"])) for frame in frames] == [(1, 1), (3, 2)]
+
+
+def test_another_step_begins_another_frame_and_a_tick_that_waited_keeps_the_one_before() -> None:
+    """A reload of `telemetry.every_ticks` comes between the daemon's messages, not between the page's."""
+    *first, timing = parts(1)
+    joiner = joined(*parts(0), *first)
+    joiner.add(timing, 10)
+    for seq in (10, 20):
+        for part in parts(seq):
+            joiner.add(part, 10)
+    frames = unpacked(packed(joiner.take()))
+    assert [(frame["step"], frame["seq0"], frame["seq"]) for frame in frames] == [
+        (1.0, 0.0, [0.0, 1.0]),
+        (10.0, 10.0, [0.0, 10.0]),
+    ]
 
 
 def test_a_tick_that_makes_no_sense_is_left_out() -> None:

@@ -81,7 +81,7 @@ def ticks(message: str | bytes) -> list[int]:
     seqs: list[int] = []
     at = 0
     while isinstance(message, bytes) and at < len(message):
-        count, axes, _, first = HEADER.unpack_from(message, at)
+        count, axes, _, first, _ = HEADER.unpack_from(message, at)
         columns = 2 + 3 * axes + 7
         at += HEADER.size
         seqs += [int(first + seq) for seq in struct.unpack_from(f"<{count}f", message, at + 4 * count)]

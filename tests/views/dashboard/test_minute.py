@@ -150,6 +150,32 @@ def test_a_forged_message_of_the_daemon_is_said_and_what_follows_is_shown(
         page.wait_for("document.getElementById('trouble').hidden")
 
 
+def test_every_tick_counts_by_the_step_it_was_published_with(browser: Browser, stage: Stage, served: Served) -> None:
+    """For a page that is there when `telemetry.every_ticks` is reloaded, and for one that is sent it as the past."""
+    first = stage.last + 10 - stage.last % 10
+    with browser.page(served.watch) as page:
+        has_come(page, stage.last)
+        before = page.inside("page.store.punctuality().lost") + first - stage.last - 1
+        stage.play(still(2000, first))
+        stage.reload(every_ticks=10)
+        stage.play(still(1000, first + 2000))
+        stage.play(still(1000, first + 3050))  # five of those that are published are not there
+        stage.reload(every_ticks=1)
+        stage.play(still(100, first + 4050))
+        has_come(page, first + 4149)
+        with browser.page(served.watch) as late:
+            has_come(late, first + 4149)
+            thin = [*range(first + 2000, first + 3000, 10), first + 3050, *range(first + 3050, first + 4050, 10)]
+            wanted = [*range(first, first + 2000), *thin, *range(first + 4050, first + 4150)]  # 3050: a row of nothing
+            for one in (page, late):
+                assert one.inside("page.store.punctuality().lost") == before + 5
+                ring = "page.store.ring"
+                seqs = one.inside(
+                    f"Array.from({{ length: {ring}.end }}, (_, row) => {ring}.seq[row % {ring}.capacity])"
+                )
+                assert seqs[-len(wanted) :] == wanted
+
+
 def test_lost_ticks_are_counted_and_a_restart_is_not_a_loss(browser: Browser, stage: Stage, served: Served) -> None:
     with browser.page(served.watch) as page:
         last = stage.last

@@ -117,6 +117,25 @@ def test_two_viewers_get_every_tick(page: Page, browser: Browser, served: Served
             assert one.inside(f"[...new Set({steps})]") == [1]
 
 
+def test_a_reload_of_every_ticks_loses_no_tick(page: Page, browser: Browser, served: Served, daemon: Daemon) -> None:
+    """Neither for a page that looks on, nor for one that comes then and is sent the minute before."""
+    try:
+        for every_ticks in (50, 1):
+            daemon.config.write_text(f"{CONFIG}\n[telemetry]\nevery_ticks = {every_ticks}\n")
+            assert daemon.ask("reload") == ""
+            page.wait_inside(f"page.store.status.every_ticks === {every_ticks}")
+            last = page.inside("page.store.lastSeq")
+            page.wait_inside(f"page.store.lastSeq > {last} + 500")
+            with browser.page(served.watch) as late:
+                late.wait_inside(f"page.store.lastSeq > {last}")
+                for one in (page, late):
+                    assert one.inside("page.store.gaps") == []
+                    assert one.inside("page.store.punctuality().lost") == 0
+    finally:
+        daemon.config.write_text(CONFIG)
+        assert daemon.ask("reload") == ""
+
+
 def test_a_contact_is_held_with_every_tick_before_and_after(page: Page) -> None:
     page.click("#span button:nth-child(1)")
     page.click("#trigger button:nth-child(2)")

@@ -43,6 +43,7 @@ class Feed:
         self._target = target
         self._send = send
         self._joiner = TickJoiner()
+        self._every_ticks = 1
         self._client: Client | None = None
         self._heard_s = time.monotonic()
         self._again_s = 0.0
@@ -107,7 +108,7 @@ class Feed:
     def _sort(self, record: Record, notes: dict[str, list[dict[str, Any]]]) -> None:
         match record:
             case Position() | Energy() | Damping() | Timing():
-                self._joiner.add(record)
+                self._joiner.add(record, self._every_ticks)
             case Cycle():
                 notes["cycles"].append(asdict(record))
             case Event():
@@ -116,6 +117,7 @@ class Feed:
                 self._joiner.restart(record)
             case Status():
                 self._heard_s = time.monotonic()
+                self._every_ticks = record.every_ticks
                 self._say("status", record.as_map())
                 self._doubt("")
             case Gap() | Input():  # the page sees gaps by the ticks' numbers

@@ -26,7 +26,7 @@ class Streamed:
         ticks: samples of the stream of ticks.
         texts: samples of the other one.
         missing: ticks that did not come, or not whole.
-        layouts: how often the streams were made anew since axes or walls had changed; 1 from the first tick on.
+        layouts: how often the streams were made anew since axes, walls or rate had changed; 1 from the first tick on.
     """
 
     ticks: int = 0

@@ -16,22 +16,24 @@ _AXIS_BY_AXIS = (
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What a tick consists of.
+    """What a tick consists of, and how many come a second; a stream can change neither while it lives.
 
     Attributes:
         axes: of the device, by name.
         walls: how many there are.
+        rate_hz: ticks a second that are published [Hz].
     """
 
     axes: tuple[str, ...]
     walls: int
+    rate_hz: float
 
     @classmethod
     def of(cls, tick: JoinedTick, status: Status) -> Layout:
         """The layout of a tick; an axis that the status does not name has its number for a name."""
         count = len(tick.position.position_m)
         axes = status.axes if len(status.axes) == count else tuple(str(at) for at in range(count))
-        return cls(axes, len(tick.damping.damping_n_s_per_m))
+        return cls(axes, len(tick.damping.damping_n_s_per_m), status.rate_hz / max(1, status.every_ticks))
 
     @property
     def channels(self) -> tuple[tuple[str, str, str], ...]:

@@ -28,8 +28,7 @@ class Outlets:
     def __init__(self, layout: Layout, status: Status) -> None:
         self.layout = layout
         channels = layout.channels
-        rate_hz = status.rate_hz / max(1, status.every_ticks)
-        info = _info(status, "ticks", "Haptics", len(channels), rate_hz, pylsl.cf_double64)
+        info = _info(status, "ticks", "Haptics", len(channels), layout.rate_hz, pylsl.cf_double64)
         info.set_channel_labels([name for name, _, _ in channels])
         info.set_channel_units([unit for _, unit, _ in channels])
         info.set_channel_types([kind for _, _, kind in channels])

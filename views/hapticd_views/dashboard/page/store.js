@@ -21,12 +21,13 @@ export class Store {
     this.gaps = []; // { t, missing }
     this.cycles = [];
     this.events = [];
-    this.lastSeq = null;
+    this.lastSeq = this.lastStep = null;
   }
 
+  /** There is room for every tick, also where few are published now: those before were perhaps all published. */
   setStatus(status) {
     this.status = status;
-    const capacity = Math.ceil(this.keepS * (status.rate_hz || 1000) / status.every_ticks * SPARE);
+    const capacity = Math.ceil(this.keepS * (status.rate_hz || 1000) * SPARE);
     if (capacity !== this.ring.capacity) this.ring = this.ring.resized(capacity);
   }
 
@@ -36,7 +37,7 @@ export class Store {
     for (const frame of frames(buffer)) {
       if (frame.axes !== this.ring.axes) {
         this.ring = new Ring(frame.axes, this.ring.capacity);
-        this.lastSeq = null;
+        this.lastSeq = this.lastStep = null;
       }
       this.#addFrame(frame);
     }
@@ -52,11 +53,11 @@ export class Store {
     }
   }
 
-  /** Share of the ticks here that began late, and how many did not arrive. */
+  /** Share of the last minute's ticks that began late, and how many did not arrive. */
   punctuality() {
     const late = this.ring.columns.late;
     let count = 0, behind = 0;
-    for (let row = this.ring.begin; row < this.ring.end; row++) {
+    for (let row = this.ring.rowAt(this.ring.latest - this.keepS); row < this.ring.end; row++) {
       const us = late[row % this.ring.capacity];
       if (us >= 0) count++;
       if (us >= LATE_US) behind++;
@@ -65,19 +66,23 @@ export class Store {
   }
 
   #addFrame(frame) {
-    const step = this.status ? this.status.every_ticks : 1;
     const values = new Array(frame.columns.length);
     for (let i = 0; i < frame.count; i++) {
       const t = frame.t0 + frame.t[i], seq = frame.seq0 + frame.seq[i];
-      if (this.lastSeq !== null && seq !== this.lastSeq + step) {
-        // A row of nothing parts the curves; a daemon that was started anew counts from 0 and lost nothing.
-        const missing = seq > this.lastSeq ? Math.round((seq - this.lastSeq) / step) - 1 : 0;
-        if (missing) this.gaps.push({ t, missing });
-        this.ring.push(t, seq, null);
-      }
+      const missing = this.#missing(seq, frame.step);
+      if (missing) this.gaps.push({ t, missing });
+      // A row of nothing parts the curves; a daemon that was started anew counts from 0 and lost nothing.
+      if (missing || (this.lastSeq !== null && seq <= this.lastSeq)) this.ring.push(t, seq, null);
       this.lastSeq = seq;
+      this.lastStep = frame.step;
       for (let c = 0; c < values.length; c++) values[c] = frame.columns[c][i];
       this.ring.push(t, seq, values);
     }
+  }
+
+  /** Ticks lost before this one. Between two steps that is not known: a reload changed the step somewhere in between. */
+  #missing(seq, step) {
+    if (this.lastSeq === null || step !== this.lastStep) return 0;
+    return Math.max(0, Math.round((seq - this.lastSeq) / step) - 1);
   }
 }
