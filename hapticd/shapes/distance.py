@@ -19,7 +19,7 @@ CAPSULE = 3
 CYLINDER = 4
 FIELD = 5
 
-_POINT_M = 1e-100
+_POINT_M = 1e-100  # what is shorter is a point and has no direction: the square of a much shorter length is 0
 
 
 def plane_distance(x: float, y: float, z: float) -> tuple[float, float, float, float]:
@@ -52,7 +52,7 @@ def box_distance(
     x -= a
     y -= b
     z -= c
-    if x <= 0.0 and y <= 0.0 and z <= 0.0:
+    if x <= _POINT_M and y <= _POINT_M and z <= _POINT_M:
         if x >= y and x >= z:
             return x - rounding, sx, 0.0, 0.0
         if y >= z:
@@ -100,7 +100,7 @@ def cylinder_distance(
         sz = -1.0
     q = across - radius
     h = z - half_length
-    if q <= 0.0 and h <= 0.0:
+    if q <= _POINT_M and h <= _POINT_M:
         if q >= h:
             return q - rounding, ux, uy, 0.0
         return h - rounding, 0.0, 0.0, sz

@@ -23,6 +23,8 @@ _VERSION = 1
 _HEADER = struct.Struct("<16sIIII3ddddI")  # ..., CRC of the distances; behind it the CRC of all that
 _CHECK = struct.Struct("<I")
 _TOP = 1.0 + 1e-9  # less than the last point, which has no neighbour beyond it
+_LEAST = 1e-100  # what is shorter has no direction: the square of a much shorter length is 0
+_EDGE = -_LEAST  # in spacings: what is that little before the first point is on it
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,16 +128,16 @@ def field_distance(shape: Any, voxels: Any, x: float, y: float, z: float) -> tup
     u = (x - shape.ox) * shape.per_m
     v = (y - shape.oy) * shape.per_m
     w = (z - shape.oz) * shape.per_m
-    if not (0.0 <= u <= shape.tx and 0.0 <= v <= shape.ty and 0.0 <= w <= shape.tz):
-        if 0.0 <= u <= shape.tx:
+    if not (_EDGE <= u <= shape.tx and _EDGE <= v <= shape.ty and _EDGE <= w <= shape.tz):
+        if _EDGE <= u <= shape.tx:
             u = 0.0
         elif u > 0.0:
             u -= shape.tx
-        if 0.0 <= v <= shape.ty:
+        if _EDGE <= v <= shape.ty:
             v = 0.0
         elif v > 0.0:
             v -= shape.ty
-        if 0.0 <= w <= shape.tz:
+        if _EDGE <= w <= shape.tz:
             w = 0.0
         elif w > 0.0:
             w -= shape.tz
@@ -172,7 +174,7 @@ def field_distance(shape: Any, voxels: Any, x: float, y: float, z: float) -> tup
     gz = da + v * (db - da)
     gz += u * (dc + v * (dd - dc) - gz)
     length = sqrt(gx * gx + gy * gy + gz * gz)
-    if length == 0.0:
+    if length < _LEAST:
         return a + u * c, 0.0, 0.0, 1.0
     return a + u * c, gx / length, gy / length, gz / length
 

@@ -110,8 +110,12 @@ class RemoteProcess:
             realtime=loop.realtime and bool(cpus),
         ).packed()
         self._descriptor = loop.shared.descriptor
-        if self._process is not None:  # else `turn` starts it
+        if self._process is None or self._channel is None:
+            return  # `turn` starts it
+        try:
             self._send()
+        except OSError:  # no room for the settings, and it must not go on with those before: it ends, `turn` sees that
+            self._channel.shutdown(socket.SHUT_RDWR)
 
     def wait_ready(self) -> None:
         """Return when clients can come, at once where it is not needed.

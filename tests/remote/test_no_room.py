@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import resource
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,6 +35,19 @@ def loop() -> Iterator[Any]:
     shared.close()
 
 
+@contextlib.contextmanager
+def no_descriptor_left() -> Iterator[None]:
+    """A process, this one, that has as many files open as it may."""
+    before, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    free = os.open(os.devnull, os.O_RDONLY)
+    os.close(free)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (free, most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (before, most))
+
+
 def test_one_that_cannot_be_started_is_told_tried_again_later_and_ends_no_daemon(
     loop: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -59,3 +74,25 @@ def test_one_that_cannot_be_started_is_told_tried_again_later_and_ends_no_daemon
     wait_until(lambda: not list(remote.turn()) and (tmp_path / "scene").exists(), "its sockets")
     remote.close()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_one_that_cannot_be_told_of_a_scene_ends_and_another_serves_that_scene(loop: Any, tmp_path: Path) -> None:
+    """The daemon ended: where no file can be opened there is none to hand the settings over in."""
+    edited = parse(CONFIG.replace('"tool"', '"other"'), "lab.toml")
+    remote = RemoteProcess(tmp_path)
+    remote.serve(parse(CONFIG, "lab.toml"), loop, None, 0)
+    wait_until(lambda: not list(remote.turn()) and (tmp_path / "scene").exists(), "its sockets")
+    with no_descriptor_left():
+        remote.serve(edited, loop, None, 0)
+    told: list[str] = []
+
+    def has_ended() -> bool:
+        told.extend(remote.turn())
+        return told != []
+
+    wait_until(has_ended, "its end")
+    assert "the process that hears clients ended with exit code" in told[0]
+    before = remote.counts
+    wait_until(lambda: not list(remote.turn()) and remote.counts is not before, "counts of the next one")
+    assert remote.counts["remote_name"] == ["other"]
+    remote.close()

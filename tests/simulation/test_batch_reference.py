@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +11,7 @@ from hapticd import plugins
 from hapticd.simulation.batch import Batch
 from hapticd_bench.batch import Reference, grid, measure
 
-needs_a_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
-
-@needs_a_compiler
 @pytest.mark.parametrize("settling", [False, True], ids=["no-target", "every-other-has-a-target"])
 def test_the_reference_in_c_ends_in_the_same_states_to_the_last_bit(settling: bool, tmp_path: Path) -> None:
     """When this fails after a change of the kernel or the energy-cycle law, batch_reference.c has to follow it."""
@@ -29,7 +25,6 @@ def test_the_reference_in_c_ends_in_the_same_states_to_the_last_bit(settling: bo
 
 
 @pytest.mark.nightly
-@needs_a_compiler
 def test_the_benchmark_finds_them_alike_and_compiled_python_near_c() -> None:
     figures = measure(points=60, seconds=1.0, repeats=1)
     assert figures.equal
