@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 import signal
 import subprocess
 import sys
-import tomllib
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -20,26 +18,7 @@ from hapticd.cli import main, remote
 from hapticd.cli.app import COMMANDS, GROUP, application
 from hapticd.client import RefusedError
 from hapticd.errors import DeviceNotFoundError
-from hapticd.paths import directory
-
-HAPTICD = Path(sys.executable).with_name("hapticd")
-GOOD = str(directory("config") / "hapticd.toml")
-
-
-def hapticd(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [HAPTICD, *arguments], env={**os.environ, **environment}, capture_output=True, text=True, check=False
-    )
-
-
-@pytest.fixture
-def bad(tmp_path: Path) -> Path:
-    file = tmp_path / "bad.toml"
-    file.write_text("[loop]\nrate_hz = 50\n[controller]\nlaw = 'tdap'\n")
-    return file
-
-
-# -- the frame
+from tests.cli.shell import GOOD, HAPTICD, hapticd
 
 
 def test_version_and_help_are_answers() -> None:
@@ -244,78 +223,6 @@ def test_a_reader_that_leaves_early_is_no_error_message() -> None:
     assert done.stderr == ""
 
 
-# -- check
-
-
-def test_check_prints_a_line_for_each_good_file_and_every_problem_of_the_others(bad: Path) -> None:
-    done = hapticd("check", GOOD, bad, bad.parent / "absent.toml")
-    assert done.returncode == 2
-    (line,) = done.stdout.splitlines()
-    assert line.startswith(f"{GOOD}: ok, ")
-    assert line.endswith(", loopback with ring-damping at 1000 Hz")
-    assert [problem.split(": ")[:2] for problem in done.stderr.splitlines()] == [
-        [str(bad), "loop.rate_hz = 50"],
-        [str(bad), 'controller.law = "tdap"'],
-        [str(bad.parent / "absent.toml"), "no such file"],
-    ]
-
-
-OWN = """import sys
-from pydantic import field_validator
-from hapticd.driver import Field
-from hapticd.simulation.options import SimulationOptions
-from hapticd_drivers.loopback import Loopback
-class Options(SimulationOptions):
-    fails: str
-    @field_validator("fails")
-    def leave(cls, fails):
-        if fails == "options":
-            raise SystemExit(0)
-        return fails
-class Own(Loopback):
-    Options = Options
-    def __init__(self, options, period_s):
-        if options.fails == "__init__":
-            sys.exit(0)
-        super().__init__(options, period_s)
-    @classmethod
-    def check(cls, options, period_s):
-        if options.fails == "check":
-            raise KeyboardInterrupt
-    def _open(self):
-        return {}["port"]
-DRIVER = Own
-"""
-
-
-def test_what_plug_ins_do_to_a_check_is_a_line_of_their_file_and_the_other_files_are_checked(tmp_path: Path) -> None:
-    """A module that exits ended it without a word."""
-    (tmp_path / "lab").mkdir()
-    (tmp_path / "lab/__init__.py").touch()
-    (tmp_path / "lab/own.py").write_text(OWN)
-    files = []
-    for failing in ("options", "check", "__init__", "_open"):
-        files.append(tmp_path / f"{failing}.toml")
-        files[-1].write_text(f'[device]\ndriver = "lab.own"\n[device.options]\nfails = "{failing}"\n')
-    for kind, failing in (("device", "driver"), ("controller", "law")):
-        (tmp_path / f"lab/{failing}.py").write_text("import sys\nsys.exit(0)\n")
-        files.append(tmp_path / f"{failing}.toml")
-        files[-1].write_text(f'[{kind}]\n{failing} = "lab.{failing}"\n')
-    done = hapticd("check", *files, GOOD, PYTHONPATH=str(tmp_path))
-    assert done.returncode == 2
-    assert done.stdout.startswith(f"{GOOD}: ok, ")
-    said = [line.removeprefix(f"{tmp_path}/") for line in done.stderr.splitlines()]
-    assert said == [
-        "options.toml: device.options: cannot be checked: SystemExit: 0 (own.py:11)",
-        "check.toml: device.options: cannot be checked: KeyboardInterrupt (own.py:22)",
-        "__init__.toml: driver lab.own.Own: __init__: SystemExit: 0 (own.py:17)",
-        "_open.toml: driver lab.own.Own: _open: KeyError: 'port' (own.py:24)",
-        "driver.toml: device.driver = \"lab.driver\": driver module 'lab.driver' cannot be imported: SystemExit: 0"
-        " (driver.py:2)",
-        "law.toml: controller.law = \"lab.law\": law module 'lab.law' cannot be imported: SystemExit: 0 (law.py:2)",
-    ]
-
-
 @pytest.mark.parametrize(
     ("command", "kind"), [(["check"], "law"), (["run", "--config"], "driver")], ids=["check", "run"]
 )
@@ -342,21 +249,6 @@ def test_a_users_ctrl_c_while_a_plug_in_is_imported_is_no_fault_of_the_plug_in(
     assert (asked.returncode, said) == (130, "")
 
 
-def test_check_as_json_says_the_same(bad: Path) -> None:
-    done = hapticd("check", "--json", GOOD, bad)
-    good, wrong = json.loads(done.stdout)
-    assert (done.returncode, done.stderr) == (2, "")
-    assert (good["ok"], good["driver"], good["law"], good["rate_hz"]) == (True, "loopback", "ring-damping", 1000.0)
-    assert good["sha256"].startswith(good["hash"])
-    assert (wrong["ok"], len(wrong["problems"])) == (False, 2)
-
-
-def test_check_of_good_files_succeeds() -> None:
-    files = sorted(directory("config").glob("*.toml"))
-    done = hapticd("check", *files)
-    assert (done.returncode, done.stderr, len(done.stdout.splitlines())) == (0, "", len(files))
-
-
 @pytest.mark.parametrize("command", ["check", "run", "simulate"])
 def test_an_object_on_a_device_with_one_axis_is_refused_by_name(tmp_path: Path, command: str) -> None:
     """It must not run without the object, as if there were nothing there."""
@@ -370,102 +262,3 @@ def test_an_object_on_a_device_with_one_axis_is_refused_by_name(tmp_path: Path, 
     done = hapticd(*arguments[command])
     assert done.returncode == 2
     assert f'{file}: scene.objects[0] "ball": objects need three axes, and loopback (omega7 model) has 1' in done.stderr
-
-
-def test_check_puts_a_simulated_device_and_its_scene_together(tmp_path: Path) -> None:
-    file = tmp_path / "walls.toml"
-    walls = "".join(f'[[scene.walls]]\naxis = "{axis}"\nstiffness_n_per_m = 9e3\n' for axis in "xy")
-    file.write_text(walls)
-    done = hapticd("check", file)
-    assert done.returncode == 2
-    assert 'scene.walls[1].axis = "y": loopback (omega7 model) has a single axis' in done.stderr
-
-
-# -- config, devices, controllers
-
-
-def test_config_show_fills_in_the_defaults() -> None:
-    shown = tomllib.loads(hapticd("config", "show", GOOD).stdout)
-    assert shown["safety"]["ramp_s"] == 0.05
-    assert shown["device"]["options"]["mass_kg"] == 0.25
-    assert shown["controller"]["params"]["pull_after"] == 4
-
-
-def test_config_show_of_a_bad_file_prints_its_problems(bad: Path) -> None:
-    done = hapticd("config", "show", bad)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert [line.startswith(f"hapticd: {bad}: ") for line in done.stderr.splitlines()] == [True, True]
-
-
-def test_config_schema_is_json() -> None:
-    assert json.loads(hapticd("config", "schema").stdout)["title"] == "hapticd configuration"
-
-
-def test_devices_lists_options_with_units_and_branches() -> None:
-    (loopback,) = [plugin for plugin in json.loads(hapticd("devices", "--json").stdout) if plugin["name"] == "loopback"]
-    parameters = {(parameter["key"], parameter["only_with"]): parameter for parameter in loopback["parameters"]}
-    mass = parameters["mass_kg", ""]
-    assert (mass["default"], mass["unit"], mass["required"]) == (0.25, "kg", False)
-    assert parameters["changes[].at_s", ""]["required"]
-    assert parameters["hand.force.newton", 'hand.force.profile = "step"']["unit"] == "N"
-
-
-def test_controllers_lists_laws_for_people() -> None:
-    shown = hapticd("controllers", COLUMNS="200").stdout
-    assert "tdpa  Time-domain passivity control." in shown
-    assert "damping_cap_n_s_per_m" in shown
-    assert '"spring" | "total"' in shown
-    only = hapticd("controllers", "energy-cycle", COLUMNS="40").stdout
-    assert "tdpa" not in only
-    assert "minimum" in "".join(only.split()), "a word that is longer than its column is broken and not cut off"
-    assert "…" not in only
-
-
-def test_a_parameter_without_a_description_is_told_by_what_it_may_be(tmp_path: Path) -> None:
-    """Its meaning began with a semicolon."""
-    (tmp_path / "lab").mkdir()
-    (tmp_path / "lab/damper.py").write_text(
-        "from hapticd.law import Field, LawParams\n"
-        "class Params(LawParams):\n    gain: float = Field(0.5, ge=0.0, le=1.0)\n"
-        "class State:\n    pass\n"
-        "def start(state, params, snapshot):\n    return State()\n"
-        "def step(state, params, tick):\n    return 0.0\n"
-    )
-    done = hapticd("controllers", "lab.damper", PYTHONPATH=str(tmp_path), COLUMNS="120")
-    assert done.returncode == 0, done.stderr
-    (gain,) = [line.split() for line in done.stdout.splitlines() if "gain" in line]
-    assert gain == ["gain", "0.5", "from", "0", "to", "1"]
-    assert ";" not in done.stdout
-
-
-@pytest.mark.parametrize(
-    ("command", "kind", "typed", "meant"),
-    [
-        ("controllers", "law", "energy-cycl", "energy-cycle"),
-        ("devices", "driver", "omega6", "omega7"),
-    ],
-)
-def test_a_mistyped_plug_in_is_told_from_those_that_are_installed(
-    command: str, kind: str, typed: str, meant: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main([command, typed])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err.startswith(f'hapticd: no {kind} {typed!r}: did you mean "{meant}"? installed are ')
-
-
-def test_a_plugin_that_cannot_be_imported_is_listed_with_the_reason(tmp_path: Path) -> None:
-    information = tmp_path / "broken-1.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
-    (information / "entry_points.txt").write_text("[hapticd.drivers]\nbroken = broken_driver:Broken\n")
-    (tmp_path / "broken_driver.py").write_text("import no_such_library")
-    done = hapticd("devices", "--json", PYTHONPATH=str(tmp_path))
-    assert done.returncode == 0
-    problems = {plugin["name"]: plugin["problem"] for plugin in json.loads(done.stdout)}
-    assert problems["loopback"] == ""
-    assert "No module named 'no_such_library'" in problems["broken"]
-    assert "cannot be used" in hapticd("devices", PYTHONPATH=str(tmp_path)).stdout
-    assert "driver.broken" not in json.loads(hapticd("config", "schema", PYTHONPATH=str(tmp_path)).stdout)["$defs"]
-    alone = hapticd("devices", "broken", PYTHONPATH=str(tmp_path))
-    assert (alone.returncode, alone.stdout) == (2, "")

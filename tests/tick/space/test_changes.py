@@ -6,24 +6,18 @@ import dataclasses
 import math
 from contextlib import nullcontext
 from itertools import pairwise
-from types import ModuleType
 from typing import Any
 
 import pytest
 
 from hapticd import plugins
-from hapticd.config.safety import SafetyConfig
 from hapticd.errors import ConfigError
 from hapticd.law import LawSnapshot
-from hapticd.tick import fallback
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.contact import RunningLaw
-from tests.tick.space import nonsense, passing_fault
 from tests.tick.space.rig import INFO, Rig, apart, ball, config, length, table
 
 RAMP_TICKS = 50
-REAL = dataclasses.replace(INFO, simulated=False, host_silence_ms=20.0)
-AT = (0.0, 0.0, 0.0292)
 
 
 def pressed(scene: str = "", law: str = "energy-cycle") -> Rig:
@@ -255,126 +249,6 @@ def test_laws_start_from_what_is_measured_when_the_switch_is_taken_over(monkeypa
     assert started.count((round(at_m, 9), speed)) == 9, "the ball, and walls as high as it"
 
 
-def test_a_law_that_fails_on_an_object_is_replaced_and_the_force_let_out() -> None:
-    rig = pressed()
-    loaded = config(ball())
-    contact = rig.tick.solids[0]
-    contact.normal.law = RunningLaw(passing_fault, passing_fault.Params())
-    rig.go((0.0, 0.0, 0.0291))
-    assert rig.tick.fallback
-    assert "passing_fault" in rig.tick.fault_text
-    assert rig.force[2] > 3.0
-    rig.to((0.0, 0.0, 0.0291), 60)
-    assert rig.force == (0.0, 0.0, 0.0)
-    assert loaded.law is not contact.normal.law.module
-
-
-def come_in(rig: Rig, first_s: float) -> list[float]:
-    """The force along z on a device that stands still: after a tick that comes so late, and then in time."""
-    found = []
-    for tick in range(RAMP_TICKS + 10):
-        passed_s = 1e-3 if tick else first_s
-        rig.sample.time_ns += round(passed_s * 1e9)
-        found.append(rig.tick.advance(rig.sample, passed_s)[2])
-    return found
-
-
-@pytest.mark.parametrize("enable_s", [0.0, 0.02, 0.09])
-def test_an_object_comes_in_with_the_first_tick_after_arming_however_late_that_is(enable_s: float) -> None:
-    """As a wall does: 1.6 N of 4 in the first tick, where the device took 20 ms to let forces through."""
-    rig = Rig(ball(), "none", info=REAL).start((0.0, 0.0, 0.031)).to(AT, 60)
-    rig.tick.guard.drop()
-    rig.go(AT)
-    assert rig.tick.arm()
-    steps = [4.0 * min(tick / RAMP_TICKS, 1.0) for tick in range(RAMP_TICKS + 10)]
-    assert come_in(rig, 1e-3 + enable_s) == pytest.approx(steps)
-
-
-@pytest.mark.parametrize("start_s", [0.0, 0.02, 0.04])
-@pytest.mark.parametrize("after_n", [2.0, 0.0, 8.0], ids=["softer", "gone", "stiffer"])
-def test_an_object_changes_from_when_the_change_is_ready_and_not_from_the_tick_before(
-    start_s: float, after_n: float
-) -> None:
-    """What it took to start laws was counted as the ramp's."""
-    rig = Rig(ball(), "none", info=REAL).start((0.0, 0.0, 0.031)).to(AT, 60).go(*(5 * [AT]))
-    rig.switch(ball(stiffness=after_n / 8e-4) if after_n else "", "damper")
-    rig.tick.begin_late(start_s)
-    steps = [4.0 + (after_n - 4.0) * min(tick / RAMP_TICKS, 1.0) for tick in range(RAMP_TICKS + 10)]
-    assert come_in(rig, 1e-3 + start_s) == pytest.approx(steps, abs=1e-12)
-
-
-def test_a_ramp_that_is_under_way_counts_the_time_that_another_request_takes() -> None:
-    rig = Rig(ball(), "none", info=REAL).start((0.0, 0.0, 0.031)).to(AT, 60).go(*(5 * [AT]))
-    rig.switch(ball(stiffness=2500.0)).go(*(11 * [AT]))
-    assert rig.force[2] == pytest.approx(4.0 - 2.0 * 10 / RAMP_TICKS)
-    rig.tick.begin_late(0.02)
-    assert come_in(rig, 0.021)[0] == pytest.approx(4.0 - 2.0 * 31 / RAMP_TICKS)
-
-
-def test_what_a_request_takes_is_nothing_to_a_simulated_device_nor_to_one_that_was_never_armed() -> None:
-    """A ramp of the one goes by ticks, so that a run can be repeated; and the other has none."""
-    fast, slow = (pressed(law="none") for _ in range(2))
-    for rig in (fast, slow):
-        for _ in rig.tick.switch(config(ball(stiffness=9000.0)).config.scene, SafetyConfig(max_force_n=2.0)):
-            pass
-    slow.tick.begin_late(0.02)
-    assert come_in(slow, 1e-3) == come_in(fast, 1e-3)
-    never = make_tick(config(ball()), REAL)
-    never.start(fast.sample)
-    never.begin_late(0.02)
-    assert never.advance(fast.sample, 1e-3) == [0.0, 0.0, 0.0]
-
-
-@pytest.mark.parametrize("at", [0, 1], ids=["a wall's", "an object's"])
-def test_the_law_that_failed_is_named_and_no_other(at: int) -> None:
-    """The first contact's was, whichever had failed: the way back is to mend it."""
-    wall = '[[scene.walls]]\naxis = "z"\nstiffness_n_per_m = 100.0\nposition_m = 0.03\n'
-    rig = pressed(wall + ball(), "damper")
-    failing = (rig.tick.contacts[0], rig.tick.solids[0].normal)[at]
-    failing.law = RunningLaw(nonsense, nonsense.Params())
-    rig.go((0.0, 0.0, 0.0291))
-    assert rig.tick.fault_text == "law tests.tick.space.nonsense: ArithmeticError: nan is not a possible number"
-
-
-@pytest.mark.parametrize("channel", [0, 1, 2], ids=["across", "along", "along as well"])
-def test_it_is_named_in_each_direction_of_an_object(channel: int) -> None:
-    rig = pressed(ball(static_friction=0.5, dynamic_friction=0.4), "damper")
-    rig.tick.solids[0].channels[channel].law = RunningLaw(nonsense, nonsense.Params())
-    for each in rig.tick.solids[0].channels[:channel]:
-        each.law = rig.tick.solids[0].channels[channel].law.another()
-    rig.go((0.0001, 0.0, 0.0291))
-    assert rig.tick.fault_text == "law tests.tick.space.nonsense: ArithmeticError: nan is not a possible number"
-
-
-def test_a_law_that_builds_on_the_one_of_a_wall_is_named_where_it_fails_on_an_object() -> None:
-    """The wall's was, since it was in the middle of it."""
-    builds = ModuleType("lab.builds")
-    builds.__dict__.update(passing_fault.__dict__, __name__="lab.builds", step=passing_fault.step)
-    wall = '[[scene.walls]]\naxis = "z"\nstiffness_n_per_m = 100.0\nposition_m = -0.5\n'
-    rig = pressed(wall + ball(), "damper")
-    rig.tick.contacts[0].law = RunningLaw(passing_fault, passing_fault.Params())
-    rig.tick.solids[0].normal.law = RunningLaw(builds, builds.Params())
-    rig.go((0.0, 0.0, 0.0291))
-    assert rig.tick.fault_text.startswith("law lab.builds: ZeroDivisionError: as it happens")
-
-
-def test_what_comes_while_the_fallback_is_in_force_has_it_too_until_the_device_is_armed() -> None:
-    """An object that is new, and the directions of one that has become rough."""
-    rig = pressed()
-    rig.tick.solids[0].normal.law = RunningLaw(passing_fault, passing_fault.Params())
-    rig.go((0.0, 0.0, 0.0291))
-    rig.switch(ball(static_friction=0.5, dynamic_friction=0.4) + ball("other", position_m=(0.2, 0.0, 0.0)))
-    laws = [channel.law for contact in rig.tick.solids for channel in contact.channels]
-    assert len(laws) == 4
-    assert {law.module for law in laws} == {fallback}
-    assert {law.params.damping_n_s_per_m for law in laws} == {INFO.safe_damping_n_s_per_m}
-    rig.to((0.0, 0.0, 0.0291), 60)
-    rig.tick.guard.clear()
-    rig.tick.arm()
-    names = {channel.law.module.__name__ for contact in rig.tick.solids for channel in contact.channels}
-    assert names == {"hapticd_controllers.energy_cycle"}
-
-
 def test_a_turned_normal_makes_a_law_forget_the_mass_of_its_direction() -> None:
     rig = pressed()
     contact = rig.tick.solids[0]
@@ -387,20 +261,6 @@ def test_a_turned_normal_makes_a_law_forget_the_mass_of_its_direction() -> None:
     rig.go((0.0292 * math.sin(0.4), 0.0, 0.0292 * math.cos(0.4)))
     assert contact.normal.law.state.felt_mass_kg == 0.0
     assert contact.normal.damping_n_s_per_m == 50.0  # its own bound while it knows no mass
-
-
-def test_an_object_that_swallows_the_start_is_refused_before_any_force() -> None:
-    info = dataclasses.replace(INFO, start_m=(0.0, 0.0, 0.029))
-    with pytest.raises(ConfigError) as refused:
-        Rig(ball(), info=info)
-    assert str(refused.value) == 'bench: scene.objects[0] "ball": swallows the device, which starts 1 mm inside it'
-
-
-@pytest.mark.parametrize("at", [(0.009, 0.0, 0.0), (0.0, 0.019, 0.0), (0.0, 0.0, -0.029)])
-def test_how_far_inside_it_starts_goes_by_where_the_device_is(at: tuple[float, float, float]) -> None:
-    info = dataclasses.replace(INFO, start_m=at)
-    with pytest.raises(ConfigError, match="starts 1 mm inside it"):
-        Rig(table("box", "box", size_m=(0.02, 0.04, 0.06)), info=info)
 
 
 def test_a_device_with_one_axis_takes_no_object_over() -> None:
@@ -428,63 +288,6 @@ def test_what_fades_out_has_no_force_of_its_own_and_is_dropped_when_it_is_gone()
     assert rig.force == (0.0, 0.0, 0.0)
     assert rig.tick.awake == []
     assert rig.unbalanced_j() < 1e-12
-
-
-PLATE: dict[str, Any] = {"size_m": (0.1, 0.1, 0.002)}
-ROUND = ((0.0, 0.0, 0.1), (0.2, 0.0, 0.1), (0.2, 0.0, -0.1), (0.0, 0.0, -0.1))
-
-
-@pytest.mark.parametrize("first", [0.1, 0.01], ids=["never in reach", "in reach before"])
-@pytest.mark.parametrize("remote", [False, True], ids=["still", "remote"])
-@pytest.mark.parametrize(
-    ("shape", "keys"),
-    [("box", PLATE), ("sphere", {"radius_m": 0.03}), ("cylinder", {"radius_m": 0.06, "length_m": 0.004})],
-    ids=["plate", "ball", "disc"],
-)
-def test_a_change_of_an_object_that_the_device_has_passed_round_is_not_felt(
-    shape: str, keys: dict[str, Any], remote: bool, first: float
-) -> None:
-    """The way there was taken for one through the object: the guard's limit, 10 cm away, for as long as it stayed."""
-    rig = Rig(table("it", shape, 5000.0, remote=remote, **keys), "none").start(ROUND[0])
-    rig.to((0.0, 0.0, first + 0.03), 100)
-    for at in ROUND:
-        rig.to(at, 100)
-    rig.switch(table("it", shape, 5500.0, remote=remote, **keys))
-    rig.forces.clear()
-    rig.to(ROUND[-1], 3 * RAMP_TICKS)
-    assert not any(map(any, rig.forces))
-    rig.to((0.0, 0.0, 0.0), 400)
-    assert rig.force[2] < -1.0, "and from where it is now it is felt"
-
-
-@pytest.mark.parametrize("z", [0.02, -0.02])
-def test_an_object_that_a_reload_puts_behind_a_free_device_does_not_hold_it(z: float) -> None:
-    """A change is no motion: nothing has swept over the hand."""
-    rig = Rig(table("plate", "box", **PLATE, position_m=(0.0, 0.0, -z)), "none").start((0.0, 0.0, 0.0))
-    rig.to((0.0, 0.0, 0.001), 20)
-    rig.switch(table("plate", "box", **PLATE, position_m=(0.0, 0.0, z))).forces.clear()
-    rig.to((0.0, 0.0, 0.001), 3 * RAMP_TICKS)
-    assert not any(map(any, rig.forces))
-
-
-@pytest.mark.parametrize("before", ["", ball("far", position_m=(0.5, 0.0, 0.0))], ids=["empty", "another far away"])
-def test_a_new_object_comes_in_by_a_ramp_where_the_device_is_now(before: str) -> None:
-    """Without objects nobody kept where the device is: the first began where it had been armed, 10 N in one tick."""
-    here = (0.0, 0.0, 0.028)
-    rig = Rig(before, "none").start((0.0, 0.0, 0.1)).to(here, 100)
-    rig.switch(before + ball()).forces.clear()
-    rig.to(here, 3 * RAMP_TICKS)
-    steps = [apart(now, last) for last, now in pairwise([(0.0, 0.0, 0.0), *rig.forces])]
-    assert max(steps) <= 2.0 * 12.0 / RAMP_TICKS
-    assert rig.force[2] == pytest.approx(10.0)
-
-
-@pytest.mark.parametrize("before", ["", ball("far", position_m=(0.5, 0.0, 0.0))], ids=["empty", "another far away"])
-def test_a_new_object_between_where_the_device_was_and_is_does_not_hold_it(before: str) -> None:
-    rig = Rig(before, "none").start((0.0, 0.0, -0.02)).to((0.0, 0.0, 0.02), 100)
-    rig.switch(before + table("plate", "box", **PLATE)).forces.clear()
-    rig.to((0.0, 0.0, 0.02), 3 * RAMP_TICKS)
-    assert not any(map(any, rig.forces))
 
 
 @pytest.mark.parametrize(("first_m", "other_m"), [(0.0, 0.05), (-0.01, 0.04), (0.01, 0.05)])
