@@ -130,6 +130,7 @@ def lateness(axes: Axes, runs: Sequence[Curves]) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     style.plain_ticks(axes.xaxis, (1.0,))
+    style.plain_ticks(axes.yaxis, (1.0,))
     axes.set_xlabel("late [µs]; the dot: the latest tick")
     axes.set_ylabel("share of ticks")
 

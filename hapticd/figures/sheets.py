@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any
 
 import matplotlib as mpl
@@ -53,6 +54,9 @@ _PRINT: Any = {
     "lines.linewidth": 1.0,
     "figure.dpi": 300,
     "savefig.dpi": "figure",
+    # Names of files, runs and laws are drawn as they are: a $ in one begins no mathematics, and so numbers have none.
+    "text.parse_math": False,
+    "axes.formatter.use_mathtext": False,
 }
 
 
@@ -76,6 +80,7 @@ def draw(name: str, runs: Sequence[Curves], title: str = "") -> Figure:
     with printed():
         if name == "fig9":
             return controlled([run.from_contact().between(-0.02, FIG9_S) for run in runs], title)
+        runs = [_listed(run) for run in runs]
         if name in PLAIN:
             figure, grid = style.figure(COLUMN_IN, 2.6)
             PLAIN[name](grid[0, 0], runs)
@@ -120,6 +125,11 @@ def controlled(runs: Sequence[Curves], title: str = "") -> Figure:
     if title:
         figure.suptitle(title, fontsize=8.5, fontweight="bold")
     return figure
+
+
+def _listed(run: Curves) -> Curves:
+    """A run under a name that a legend shows: matplotlib leaves out one that begins with an underscore."""
+    return replace(run, name=f" {run.name}") if run.name.startswith("_") else run
 
 
 def _stacked(wanted: Sequence[Panel], runs: Sequence[Curves]) -> Figure:

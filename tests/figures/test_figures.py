@@ -9,9 +9,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
 import hapticd
 from hapticd.errors import ConfigError, HapticdError
@@ -19,6 +23,7 @@ from hapticd.figures import panels, style
 from hapticd.figures.curves import MOST_POINTS, Curves
 from hapticd.figures.picture import encoded, save
 from hapticd.figures.sheets import COLUMN_IN, NAMES, PAGE_IN, draw
+from tests.examples import examples
 
 CONFIG = Path(__file__).parent.parent.parent / "config"
 
@@ -127,6 +132,40 @@ def test_several_runs_are_told_apart_and_named(held: list[Curves]) -> None:
     named = [line for line in axes.lines if str(line.get_label()).startswith("run ")]
     assert len({str(line.get_label()) for line in named}) == 14
     assert len({(str(line.get_color()), str(panels.hand(at)["linestyle"])) for at, line in enumerate(named)}) == 14
+
+
+MATHEMATICS = ["$", "a$b$c", "run$^$1.mcap", "$\\frac$", "$x_1$", "\\", "\\$", "_", "_$a_b$", "a_b^c", "%", "{}", "#&~"]
+"""Names of files; matplotlib takes what stands between two $ for mathematics, and much of it for a mistake."""
+
+
+@pytest.mark.parametrize("name", ["run", "loop", "lateness", "fig9"])
+def test_the_name_of_a_run_is_drawn_as_it_is_whatever_is_in_it(name: str, held: list[Curves]) -> None:
+    runs = [replace(held[0], name=called) for called in MATHEMATICS]
+    shown = drawn_texts(draw(name, runs, "of $\\frac$"))
+    assert "of $\\frac$" in shown
+    for run in runs:
+        assert any(text == run.name or text.startswith(f"{run.name}: ") for text in shown), run.name
+
+
+@examples(30)
+@given(called=st.sampled_from(MATHEMATICS) | st.text(st.sampled_from("$\\_^{}ab% "), min_size=1))
+def test_a_title_of_any_marks_is_drawn_as_it_is(called: str) -> None:
+    assert called.strip() in ["", *drawn_texts(draw("loop", [made()], called))]
+
+
+def test_the_numbers_of_a_histogram_are_written_as_they_are_spoken(held: list[Curves]) -> None:
+    """Powers of ten are mathematics to matplotlib, which is not drawn where names are."""
+    figure = draw("lateness", held)
+    assert {"0.1", "0.01", "10"} <= set(drawn_texts(figure))
+    assert not any("$" in text for text in drawn_texts(figure))
+
+
+def drawn_texts(figure: Figure) -> list[str]:
+    """All texts of a figure as a reader of its SVG sees them."""
+    with mpl.rc_context({"svg.fonttype": "none"}):
+        root = ElementTree.fromstring(encoded(figure, ".svg"))
+    found = root.iter("{http://www.w3.org/2000/svg}text")
+    return ["".join(text.itertext()).strip() for text in found]
 
 
 @pytest.mark.parametrize("name", ["run", "loop", "lateness", "fig9"])

@@ -211,15 +211,18 @@ def test_a_full_disk_is_one_line_and_a_readable_file(runtime: dict[str, str], tm
     assert len(made.ticks["seq"]) > 100
 
 
-def test_recording_goes_on_through_a_restart_of_the_daemon(tmp_path: Path) -> None:
-    with Daemon(CONFIG) as first:
+@pytest.mark.parametrize("batch_ticks", [1, 20])
+def test_recording_goes_on_through_a_restart_of_the_daemon(batch_ticks: int, tmp_path: Path) -> None:
+    """Ticks of the second one that came before its status were read as ticks of the first one."""
+    config = f"{CONFIG}[telemetry]\nbatch_ticks = {batch_ticks}\n"
+    with Daemon(config) as first:
         first.wait_ready()
         place = {"HAPTICD_RUNTIME_DIR": str(first.directory / "run")}
         with Recording(tmp_path / "two.mcap", environment=place) as recording:
             recording.has(100_000)
             first.process.send_signal(signal.SIGTERM)
             first.process.wait()
-            first.config.write_text(CONFIG.replace("12000.0", "11000.0"))
+            first.config.write_text(config.replace("12000.0", "11000.0"))
             environment = {**os.environ, **place, "HAPTICD_STATE_DIR": str(first.directory / "state")}
             second = subprocess.Popen(
                 [HAPTICD, "run", "--config", str(first.config)], env=environment, stderr=subprocess.DEVNULL
@@ -238,8 +241,12 @@ def test_recording_goes_on_through_a_restart_of_the_daemon(tmp_path: Path) -> No
     assert [one["wall_stiffness_n_per_m"] for one in made.receipts] == [[12000.0], [11000.0]]
     assert {int(run) for run in made.ticks["run"]} == {0, 1}
     assert 105 in [event.code for event in made.events], "it was told of the end of the first one"
-    again = made.ticks["run"] == 1
-    assert made.ticks["seq"][again][0] < made.ticks["seq"][~again][-1] or not made.ticks["seq"][again][0]
+    for run in (0, 1):
+        assert set(np.diff(made.ticks["seq"][made.ticks["run"] == run]).tolist()) == {1} or made.missing
+    assert (np.diff(made.ticks["timestamp"]) > 0.0).all()
+    assert made.in_force.tolist() == made.ticks["run"].tolist()
+    lost = len(made.topics["position"]["seq"]) - len(made.ticks["seq"])
+    assert lost <= 2 * batch_ticks, "the last batch of each may not have come in all topics"
 
 
 def test_it_needs_a_daemon_and_a_place(runtime: dict[str, str], tmp_path: Path) -> None:

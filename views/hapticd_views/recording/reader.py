@@ -20,6 +20,7 @@ from hapticd_views.recording.recording import Recording
 from hapticd_views.recording.scan import Scan
 
 _TELEMETRY = "hapticd/"
+_START_S = 0.1  # no daemon ends and is started anew in less
 
 
 def read(path: Path | str) -> Recording:
@@ -60,6 +61,7 @@ class _ReadIn:
         self._channels: dict[int, str] = {}
         self._topics: dict[str, _Topic] = {}
         self._run = 0
+        self._begun = False  # the present run began at a gap, and the note of its restart has not come
 
     def describe(self, record: Metadata) -> None:
         if record.name == METADATA:
@@ -75,10 +77,28 @@ class _ReadIn:
                 self._topics.setdefault(record.topic, _Topic(self._schemas[record.schema_id]))
         elif record.channel_id in self._channels:
             name = self._channels[record.channel_id]
-            if name == NOTE and json.loads(record.data).get("restart"):
-                self._run += 1
+            if name == GAP:
+                self._look_at_gap(RecordedGap(**json.loads(record.data)))
+            elif name == NOTE and json.loads(record.data).get("restart"):
+                if not self._begun:
+                    self._run += 1
+                self._begun = False
             self._topics[name].payloads.append(record.data)
             self._topics[name].runs.append(self._run)
+
+    def _look_at_gap(self, gap: RecordedGap) -> None:
+        """Begin a run where a daemon counts anew: ticks come before its first status, and with that the note."""
+        topic = self._topics.get(gap.topic)
+        if not self._receipts or topic is None or not topic.runs or topic.runs[-1] != self._run:
+            return  # the first tick of its topic in a run that has begun
+        if gap.missing:  # a client that has no status yet takes what a new daemon has counted further for lost
+            since_s = json.loads(topic.payloads[-1])["timestamp"] + _START_S
+            anew = gap.seq < (gap.timestamp - since_s) * self._receipts[-1]["rate_hz"]
+        else:
+            anew = gap.seq <= gap.after
+        if anew:
+            self._run += 1
+            self._begun = True
 
     def recording(self, scan: Scan) -> Recording:
         if not self._receipts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -122,10 +123,15 @@ class Recording:
         """Which of `receipts` was in force in each of `ticks`.
 
         A receipt follows the status that tells of a reload; which tick was the last one before it, its event says.
+        That of a daemon that was started anew holds from its first tick on, which may have come before its status.
         """
         since: list[float] = []
         before = -np.inf
-        for receipt in self.receipts[1:]:
+        for former, receipt in pairwise(self.receipts):
+            if receipt.get("started_timestamp") != former.get("started_timestamp"):
+                before = receipt["timestamp"]
+                since.append(self._first_s(receipt))
+                continue
             told = [
                 event.timestamp
                 for event in self.events
@@ -195,6 +201,13 @@ class Recording:
             if name in ticks:
                 found[name] = ticks[name][:, index]
         return found
+
+    def _first_s(self, receipt: dict[str, Any]) -> float:
+        """Time of the first tick in the run of the status that a receipt is of [s since the epoch]."""
+        status, ticks = self.topics.get("status", {"timestamp": [], "run": []}), self.ticks
+        runs = dict(zip(status["timestamp"], status["run"], strict=True))
+        times = ticks["timestamp"][ticks["run"] == runs.get(receipt["timestamp"], -1)]
+        return float(times[0]) if len(times) else float(receipt["timestamp"])
 
     def _text_of(self, receipt: dict[str, Any]) -> tuple[str, str, Path]:
         """The text of a configuration, what errors call it, and where its files lie."""
