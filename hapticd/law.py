@@ -82,8 +82,8 @@ class LawTick:
         in_contact: whether x_m < 0.
         contact_n: the contact's own force now, spring and wall damping [N].
         spring_n: the spring's part of `contact_n` [N].
-        applied_n: force of this contact that was applied from the last sample to this one, F(n-1) [N]; of a coupling or
-            a client's force the mean of it, where that went on at ticks in between.
+        applied_n: force of this contact that was applied from the last sample to this one, F(n-1) [N]; the mean of it,
+            by the time it was held, where it went on at ticks in between.
         applied_contact_n: the part of `applied_n` that was the contact's own, without the law's damping [N].
         resolution_m: smallest step of the position that the device can report [m]; 0 when continuous.
     """

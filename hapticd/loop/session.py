@@ -96,7 +96,10 @@ class Session:
         """Tell that what a client drives was let go, or is in force again."""
         news, port.news = port.news, None
         if news is PortState.STALE:
-            text = f"{port.name}: its client is silent, or says the same for too long: let go until it says more"
+            text = (
+                f"{port.name}: its client is silent or says the same for too long, or the device was tared, calibrated "
+                "or found again: let go until it says more"
+            )
             self.event(EventCode.REMOTE_STALE, text, name=port.name)
         elif news is not None:
             self.event(EventCode.REMOTE_BACK, f"{port.name}: in force again", name=port.name)

@@ -24,6 +24,9 @@ from hapticd.tick.scene import Wall
 MOST = 1e18
 """A law that asks for more [N], or publishes more, is broken, whatever the limits are."""
 
+LONGEST_TICK = 1e9
+"""For longer no tick counts in a mean, whatever a clock says: no sum of such times is infinite [periods]."""
+
 
 class RunningLaw:
     """A law with its state and parameters as plain objects, ready for the tick.
@@ -94,6 +97,11 @@ class Contact:
         requested_n: what the law asked for in this tick, outward [N].
         force_n: the same after the blend of a transition, before the guard's share [N].
         applied_n: what was applied in the end [N].
+        mean_n, mean_spring_n: what the books reckon with, all of it and the spring's part: the mean since the last
+            sample, where ticks without one have gone by; else what was applied last [N].
+        waited: how long ticks have gone by without a sample, in periods of the loop; 0: the last one had one.
+        applied_sum, spring_sum, own_sum: over that time what was applied, the spring's part of it and the contact's
+            own, each times how long it was held [N periods].
         damping_n_s_per_m, felt_mass_kg: as published by the law; 0 when it has none.
         awake: whether a tick outside the wall has anything to do here; else it need only keep `x_m`.
     """
@@ -106,6 +114,7 @@ class Contact:
         "_resolution_m",
         "_touched",
         "applied_n",
+        "applied_sum",
         "awake",
         "blend_from_n",
         "blend_from_x_m",
@@ -119,8 +128,13 @@ class Contact:
         "in_contact",
         "law",
         "ledger",
+        "mean_n",
+        "mean_spring_n",
+        "own_sum",
         "requested_n",
+        "spring_sum",
         "tick",
+        "waited",
         "wall",
         "x_m",
     )
@@ -134,7 +148,8 @@ class Contact:
         self.in_contact = False
         self.requested_n = 0.0
         self.force_n = 0.0
-        self.applied_n = 0.0
+        self.applied_n = self.mean_n = self.mean_spring_n = 0.0
+        self.waited = self.applied_sum = self.spring_sum = self.own_sum = 0.0
         self.damping_n_s_per_m = 0.0
         self.felt_mass_kg = 0.0
         self.blending = False
@@ -154,6 +169,8 @@ class Contact:
         self.awake = self._touched = True
         self.force_n = self.requested_n = 0.0
         self.applied_n = self._applied_contact_n = self._applied_spring_n = 0.0
+        self.mean_n = self.mean_spring_n = 0.0
+        self.waited = self.applied_sum = self.spring_sum = self.own_sum = 0.0
         self.tick.applied_n = self.tick.applied_contact_n = 0.0
 
     def snapshot(self, velocity_m_per_s: float) -> LawSnapshot:
@@ -229,13 +246,15 @@ class Contact:
         """Ask the law for its force.
 
         Args:
-            periods: time since the last tick, in periods of the loop, for a blend.
+            periods: time since the last tick, in periods of the loop.
 
         Raises:
             BaseException: whatever the law raises.
             ArithmeticError: it returned or publishes something beyond all bounds.
             TypeError: it returned or publishes something that is not a number.
         """
+        if self.waited > 0.0:
+            spread(self, periods)
         law = self.law
         force_n = law.step(law.state, law.params, self.tick)
         if law.publishes:
@@ -262,6 +281,11 @@ class Contact:
         Args:
             periods: time since the last tick, in periods of the loop.
         """
+        held = periods if periods < LONGEST_TICK else LONGEST_TICK
+        self.waited += held
+        self.applied_sum += self.applied_n * held
+        self.spring_sum += self._applied_spring_n * held
+        self.own_sum += self._applied_contact_n * held
         if self.blending:
             self.force_n = blended_again(self, self.x_m, self.requested_n, periods)
 
@@ -285,8 +309,8 @@ class Contact:
             self.awake = touched or not self.law.rests
             self.ledger.update(
                 self._moved_m,
-                self.applied_n,
-                self._applied_spring_n,
+                self.mean_n,
+                self.mean_spring_n,
                 gain * wall.stored_j(self.x_m, limit_n),
                 in_contact,
                 self.damping_n_s_per_m,
@@ -296,10 +320,29 @@ class Contact:
         if self.blending:
             contact_n += self.force_n - self.requested_n  # so that what is left is the law's own part
         tick = self.tick
-        tick.applied_n = self.applied_n = share * self.force_n
+        tick.applied_n = self.mean_n = self.applied_n = share * self.force_n
         tick.applied_contact_n = self._applied_contact_n = share * contact_n
         spring_n = wall.spring_n
         self._applied_spring_n = gain * (spring_n if spring_n <= limit_n else limit_n)
+        self.mean_spring_n = self._applied_spring_n
+
+
+def spread(contact: Any, periods: float) -> None:
+    """Have the law and the books reckon with the mean of what was applied since the last sample.
+
+    The device has moved for all that time, as far as is known evenly, and not with the last tick's force alone.
+
+    Args:
+        contact: one that has waited.
+        periods: time since the last tick, in periods of the loop.
+    """
+    held = periods if periods < LONGEST_TICK else LONGEST_TICK
+    waited = contact.waited + held
+    tick = contact.tick
+    tick.applied_n = contact.mean_n = (contact.applied_sum + contact.applied_n * held) / waited
+    tick.applied_contact_n = (contact.own_sum + tick.applied_contact_n * held) / waited
+    contact.mean_spring_n = (contact.spring_sum + contact.mean_spring_n * held) / waited
+    contact.waited = contact.applied_sum = contact.spring_sum = contact.own_sum = 0.0
 
 
 def _number(value: Any) -> float:

@@ -1,7 +1,8 @@
 """Energy between a device and a wall: the books of every tick, and where one press and release ends.
 
 Sign: energy that flows into the wall is positive, E(n) = E(n-1) - F(n-1) (x(n) - x(n-1)), which is exact because a
-zero-order hold keeps F(n-1) until sample n. E falls below zero when the wall has given back more than it took.
+zero-order hold keeps F(n-1) until sample n. Where ticks without a sample change the force, F(n-1) is its mean over that
+time. E falls below zero when the wall has given back more than it took.
 """
 
 from __future__ import annotations
@@ -140,7 +141,7 @@ class EnergyLedger:
 
         Args:
             moved_m: x(n) - x(n-1) [m].
-            applied_n: F(n-1), applied from sample n-1 to sample n [N].
+            applied_n: F(n-1), applied from sample n-1 to sample n, on the mean [N].
             applied_spring_n: the spring's part of it [N].
             stored_j: energy in the spring at x(n) [J].
             in_contact: whether x(n) is inside the wall.

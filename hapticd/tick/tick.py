@@ -394,7 +394,8 @@ class ControlTick:
 
     def _drop_gone(self) -> None:
         """Close the books of walls whose force has faded out."""
-        for contact in [each for each in self.leaving if not each.blending and each.applied_n == 0.0]:
+        faded = [each for each in self.leaving if not each.blending and each.applied_n == each.applied_sum == 0.0]
+        for contact in faded:
             self.past.absorb(contact.ledger)
             self.leaving.remove(contact)
             self._active.remove(contact)

@@ -67,7 +67,10 @@ APART = {
         "changed = True": "the same",
         "return changed": "the same",
     },
-    "Contact.act": {"self.blending = False": "blends are at transitions, which the kernel has not"},
+    "Contact.act": {
+        "if self.waited > 0.0:": "a simulated device does not repeat a sample",
+        "self.blending = False": "blends are at transitions, which the kernel has not",
+    },
     "Contact.settle": {"if self.blending:": "the same"},
     "Guard.reduce": {
         "if self.changing:": "limits that change and releases are transitions",

@@ -11,7 +11,7 @@ from math import sqrt
 
 from hapticd.config.remote import PortLimits
 from hapticd.law import LawSnapshot
-from hapticd.tick.contact import Contact, RunningLaw
+from hapticd.tick.contact import Contact, RunningLaw, spread
 from hapticd.tick.guard import start_blend
 from hapticd.tick.motion import LEAST_S
 from hapticd.tick.remote.books import PortBooks
@@ -61,7 +61,6 @@ class OnePort(Port):
         "_outside_s",
         "_period_s",
         "_sample_s",
-        "_waited_s",
         "_waits",
         "asleep",
         "books",
@@ -92,7 +91,6 @@ class OnePort(Port):
         self._begun = False  # since its weight was 0
         self._waits = False  # it has gone on since the last sample
         self._sample_s = 0.0  # of a sample that no law has been shown yet
-        self._waited_s = 0.0  # since the last sample that laws have been shown
         self._outside_s = self._most_change_n = 0.0
         self._from_m = [0.0] * axes  # where the device was
 
@@ -116,7 +114,9 @@ class OnePort(Port):
                 channel.wake(True)
 
     def stand(self) -> None:
-        """Be without force and without a client, where the device is now."""
+        """Be without force and without a client, where the device is now; a client that was in force is told so."""
+        if self.state is _HELD:
+            self._become(PortState.STALE)
         self.forget()
         self._sleep()
 
@@ -159,6 +159,8 @@ class OnePort(Port):
             return
         if self._sample_s > 0.0:  # once a tick, also where a law fails and all are asked again
             passed_s = periods * self._period_s
+            if self.channels[0].waited > 0.0:
+                self._spread(periods)
             self._look(self._sample_s, passed_s)
             self._sample_s = 0.0
             self._go_on(passed_s)
@@ -176,9 +178,6 @@ class OnePort(Port):
             self._doze(periods)
             return
         passed_s = periods * self._period_s
-        self._waited_s += passed_s
-        for channel in self.channels:
-            channel.wait(passed_s)
         self._waits = self._begun and self._wait(max(passed_s, LEAST_S))
         self._go_on(passed_s)
         for channel in self.channels:
@@ -317,8 +316,6 @@ class OnePort(Port):
         Both clocks tell the time since the last sample where that was seen in the last tick. Where ticks went by in
         between, only this computer's tells what is left of it.
         """
-        if self._waited_s > 0.0:
-            self._spread(passed_s)
         if self.state is not _HELD and self.weight == 0.0:
             self._see_outside(dt_s)
             return
@@ -333,17 +330,16 @@ class OnePort(Port):
         self._see(dt_s, moved_s)
         self._from_m[:] = position_m
 
-    def _spread(self, passed_s: float) -> None:
+    def _spread(self, periods: float) -> None:
         """Have books and laws reckon with the mean of what was applied since the last sample.
 
-        The device has moved for all that time, as far as is known evenly, and not with the last tick's force alone.
+        Args:
+            periods: time since the last tick, in periods of the loop.
         """
-        waited_s = self._waited_s + passed_s
-        self._waited_s = 0.0
         taken_j = spring_j = own_j = 0.0
         for axis, channel in enumerate(self.channels):
             way_m = self.motion.position_m[axis] - self._from_m[axis]
-            more_n, more_spring_n, more_own_n = channel.spread(passed_s, waited_s)
+            more_n, more_spring_n, more_own_n = channel.spread(periods)
             taken_j -= more_n * way_m
             spring_j -= more_spring_n * way_m
             own_j -= more_own_n * way_m
@@ -364,7 +360,7 @@ class OnePort(Port):
         self.asleep = True
         self.weight = self.scale = self._outside_s = 0.0
         self._begun = self._waits = False
-        self._sample_s = self._waited_s = 0.0
+        self._sample_s = 0.0
         self._take_limit()
         self.books.let_go()
         for axis, channel in enumerate(self.channels):
@@ -396,7 +392,7 @@ class PortAxis(Channel):
         own_n: the part of what is applied that is not the law's [N].
     """
 
-    __slots__ = ("_applied_n_s", "_held_n_s", "_leads", "_own_n_s", "asked_n", "make_law", "own_n", "port")
+    __slots__ = ("_leads", "asked_n", "make_law", "own_n", "port")
 
     port: OnePort
 
@@ -406,7 +402,6 @@ class PortAxis(Channel):
         self.wall = Line(axis)  # type: ignore[assignment]  # stands for a wall, see there
         self.awake = False
         self.asked_n = self.own_n = 0.0
-        self._applied_n_s = self._held_n_s = self._own_n_s = 0.0  # since the last sample, up to the last tick
         self._leads = axis == 0
 
     def start(self, position_m: float) -> None:
@@ -485,35 +480,19 @@ class PortAxis(Channel):
         self.tick.contact_n = self._contact_n = contact_n
         self.wall.spring_n = spring_n
 
-    def rest(self) -> None:
-        """Be out of touch, at rest and without force."""
-        super().rest()
-        self._applied_n_s = self._held_n_s = self._own_n_s = 0.0
-
-    def wait(self, passed_s: float) -> None:
-        """Keep what was applied until this tick, which has no new sample [s]."""
-        self._applied_n_s += self.applied_n * passed_s
-        self._held_n_s += self.held_n * passed_s
-        self._own_n_s += self.own_n * passed_s
-
-    def spread(self, passed_s: float, waited_s: float) -> tuple[float, float, float]:
+    def spread(self, periods: float) -> tuple[float, float, float]:
         """Show the law the mean of what was applied since the last sample.
 
         Args:
-            passed_s: time since the last tick [s].
-            waited_s: since the last sample, more than 0 [s].
+            periods: time since the last tick, in periods of the loop.
 
         Returns:
             By how much the mean is more than what was applied last: of all, of the spring's part, and of the part that
             is not the law's [N].
         """
-        mean_n = (self._applied_n_s + self.applied_n * passed_s) / waited_s
-        mean_held_n = (self._held_n_s + self.held_n * passed_s) / waited_s
-        mean_own_n = (self._own_n_s + self.own_n * passed_s) / waited_s
-        self._applied_n_s = self._held_n_s = self._own_n_s = 0.0
-        self.tick.applied_n = mean_n
-        self.tick.applied_contact_n = mean_own_n
-        return mean_n - self.applied_n, mean_held_n - self.held_n, mean_own_n - self.own_n
+        spread(self, periods)
+        own_n = self.tick.applied_contact_n
+        return self.mean_n - self.applied_n, self.mean_spring_n - self.held_n, own_n - self.own_n
 
     def apply_scaled(self, share: float, scale: float) -> None:
         """Remember what is applied from now on.
@@ -526,7 +505,7 @@ class PortAxis(Channel):
         if self.blending:
             contact_n += self.asked_n - self.requested_n  # so that what is left is the law's own part
         tick = self.tick
-        tick.applied_n = self.applied_n = share * self.force_n
+        tick.applied_n = self.mean_n = self.applied_n = share * self.force_n
         tick.applied_contact_n = self._applied_contact_n = self.own_n = share * scale * contact_n
 
     def snapshot(self, velocity_m_per_s: float = 0.0) -> LawSnapshot:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from math import inf
 
@@ -11,7 +11,7 @@ from hapticd.shapes.pose import Pose, Vector
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.remote.follower import Follower
-from hapticd.tick.remote.port import Port
+from hapticd.tick.remote.port import Port, PortState
 from hapticd.tick.remote.turning import Turning, unit
 from hapticd.tick.remote.update import DAMPING, ORIENTATION, POSITION, STIFFNESS, TURNING, VELOCITY, Update
 from hapticd.tick.space.channel import Channel, stretched_m
@@ -80,6 +80,13 @@ class RemoteObject(Port):
         self._stiffness = solid.stiffness_n_per_m
         self._damping = solid.damping_n_s_per_m
 
+    def stand(self) -> None:
+        """Stay where it is, without a client; one that was in force is told so."""
+        if self.state is PortState.HELD:
+            self._become(PortState.STALE)
+        self.forget()
+        self.stop()
+
     def stop(self, position_m: Vector | None = None) -> None:
         """Stay where it is, or at a place."""
         at_m = tuple(self.follower.at_m) if position_m is None else position_m
@@ -141,7 +148,7 @@ class RemoteContact(SolidContact):
 
     moves = True
 
-    __slots__ = ("_before_n_per_m", "carried_j", "port", "ramp_s")
+    __slots__ = ("_before_n_per_m", "_held_along", "_waited_s", "_way", "carried_j", "port", "ramp_s")
 
     def __init__(
         self,
@@ -155,6 +162,9 @@ class RemoteContact(SolidContact):
         self.carried_j = 0.0
         self.ramp_s = ramp_s
         self._before_n_per_m = solid.stiffness_n_per_m
+        self._held_along: Sequence[Vector] = ()  # where ticks had no sample: along what was held until this one
+        self._way: Vector = (0.0, 0.0, 0.0)  # of the touched point, since the last sample
+        self._waited_s = 0.0  # since then, in ticks without one
         self.port = RemoteObject(limits, solid)
 
     def join(self) -> None:
@@ -171,9 +181,9 @@ class RemoteContact(SolidContact):
     def start(self, x: float, y: float, z: float) -> None:
         """Have the device at a point of the world, at rest and without force; the object stops where it is."""
         super().start(x, y, z)
-        self.port.forget()
-        self.port.stop()
+        self.port.stand()
         self.port.force_n[:] = (0.0, 0.0, 0.0)
+        self._waited_s = 0.0
 
     def change(self, solid: Solid, along: list[Channel], limit_n: float, gain: float, at: Vector) -> None:
         """Go on with another solid in the place of this one, and without force: its shade keeps that."""
@@ -192,12 +202,22 @@ class RemoteContact(SolidContact):
         self._before_n_per_m = 0.0
         self.port.forget()
 
+    def wait(self, passed_s: float) -> None:
+        """Have its client grow older at a tick without a new sample, touched or not [s]."""
+        self._waited_s += passed_s
+        self.port.pass_time(passed_s)
+
     def observe(self, at: Vector, velocity: Vector, way: Vector, dt_s: float) -> bool:
         """See a new sample from the object, which has moved since."""
         port = self.port
+        self._way = (0.0, 0.0, 0.0)
+        self._held_along = ()
+        if self.normal.waited > 0.0 and not self.quiet:
+            self._held_along = [(channel.dx, channel.dy, channel.dz) for channel in self.channels]
         for axis, newton in enumerate(port.force_n):
             port.impulse_n_s[axis] += newton * dt_s
-        port.pass_time(dt_s)
+        port.pass_time(max(0.0, dt_s - self._waited_s))
+        self._waited_s = 0.0
         if self.leaving:
             return super().observe(at, velocity, way, dt_s)
         solid = self.solid
@@ -213,10 +233,8 @@ class RemoteContact(SolidContact):
         if not proxy.touching:
             qx, qy, qz = (to - of for to, of in zip(pose.point(before.own(at)), at, strict=True))
         elif not self.quiet:
-            fx, fy, fz = self.force
-            work_j = fx * qx + fy * qy + fz * qz
-            self.carried_j += work_j
-            self.moved_j += work_j
+            self._way = (qx, qy, qz)
+            self._carry(self.force)
         seen = (way[0] - qx, way[1] - qy, way[2] - qz)
         speed = (velocity[0] - qx / dt_s, velocity[1] - qy / dt_s, velocity[2] - qz / dt_s)
         return super().observe(at, speed, seen, dt_s)
@@ -226,6 +244,8 @@ class RemoteContact(SolidContact):
 
         First the motion with the spring as it was, then what has become of the spring: that is the client's work.
         """
+        if self._held_along:
+            self._spread(dt_s)
         solid = self.solid
         now_n_per_m = solid.stiffness_n_per_m
         changed = now_n_per_m != self._before_n_per_m
@@ -241,6 +261,31 @@ class RemoteContact(SolidContact):
             self.moved_j += stored_j - self.ledger.stored_j
             self.ledger.stored_j = stored_j
         self.port.force_n[:] = self.force
+
+    def _carry(self, force_n: Vector) -> None:
+        """Enter the work of a force along the way of the touched point."""
+        fx, fy, fz = force_n
+        qx, qy, qz = self._way
+        work_j = fx * qx + fy * qy + fz * qz
+        self.carried_j += work_j
+        self.moved_j += work_j
+
+    def _spread(self, dt_s: float) -> None:
+        """Enter what the mean of what was applied since the last sample brings beyond the last tick's force.
+
+        Args:
+            dt_s: time since the last sample [s].
+        """
+        x = y = z = 0.0
+        for channel, (dx, dy, dz) in zip(self.channels, self._held_along, strict=True):
+            more_n = channel.mean_n - channel.applied_n
+            x += dx * more_n
+            y += dy * more_n
+            z += dz * more_n
+        self._held_along = ()
+        self._carry((x, y, z))
+        for axis, newton in enumerate((x, y, z)):
+            self.port.impulse_n_s[axis] += newton * dt_s
 
 
 def _max_turning(limits: PortLimits, solid: Solid) -> float:

@@ -45,10 +45,9 @@ class Channel(Contact):
     Attributes:
         dx, dy, dz: the direction along which its force acts, a unit vector.
         way_m: since the last sample, along the direction of then [m].
-        held_n: the spring's part of what is applied [N].
     """
 
-    __slots__ = ("dx", "dy", "dz", "held_n", "velocity_m_per_s", "way_m", "x_of_law_m")
+    __slots__ = ("dx", "dy", "dz", "velocity_m_per_s", "way_m", "x_of_law_m")
 
     def __init__(self, law: RunningLaw, resolution_m: float, ledger: EnergyLedger) -> None:
         super().__init__(Direction(), law, resolution_m)  # type: ignore[arg-type]  # stands for a wall, see there
@@ -57,16 +56,28 @@ class Channel(Contact):
         self.dz = 1.0
         self.velocity_m_per_s = 0.0
         self.x_of_law_m = 0.0
-        self.way_m = self.held_n = 0.0
+        self.way_m = 0.0
+
+    @property
+    def held_n(self) -> float:
+        """The spring's part of what is applied [N]."""
+        return self._applied_spring_n
+
+    @held_n.setter
+    def held_n(self, newton: float) -> None:
+        self._applied_spring_n = self.mean_spring_n = newton
 
     def rest(self) -> None:
         """Be out of touch, at rest and without force."""
         self.in_contact = False
         self.blending = False
         self.x_m = self.x_of_law_m = 0.0
-        self._moved_m = self._contact_n = self.way_m = self.held_n = 0.0
+        self._moved_m = self._contact_n = self.way_m = 0.0
         self.velocity_m_per_s = 0.0
-        self.force_n = self.requested_n = self.applied_n = self._applied_contact_n = 0.0
+        self.force_n = self.requested_n = 0.0
+        self.applied_n = self._applied_contact_n = self._applied_spring_n = 0.0
+        self.mean_n = self.mean_spring_n = 0.0
+        self.waited = self.applied_sum = self.spring_sum = self.own_sum = 0.0
         self.tick.applied_n = self.tick.applied_contact_n = 0.0
 
     def snapshot(self, velocity_m_per_s: float = 0.0) -> LawSnapshot:
@@ -117,18 +128,20 @@ class Channel(Contact):
         tick.spring_n = self.wall.spring_n = spring_n
         tick.contact_n = self._contact_n = contact_n
 
-    def apply(self, share: float) -> None:
+    def apply(self, share: float, spring_n: float) -> None:
         """Remember what is applied from now on.
 
         Args:
             share: how much of the force the guard let through, 0 to 1.
+            spring_n: the spring's part of it [N].
         """
         contact_n = self._contact_n
         if self.blending:
             contact_n += self.force_n - self.requested_n  # so that what is left is the law's own part
         tick = self.tick
-        tick.applied_n = self.applied_n = share * self.force_n
+        tick.applied_n = self.mean_n = self.applied_n = share * self.force_n
         tick.applied_contact_n = self._applied_contact_n = share * contact_n
+        self.mean_spring_n = self._applied_spring_n = spring_n
 
 
 def lay_along(channels: Sequence[Channel]) -> None:
@@ -210,12 +223,15 @@ def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: 
     """
     solid = contact.solid
     proxy = solid.proxy
-    normal, first, second = channels = contact.channels
+    channels = contact.channels
+    normal = channels[0]
     stiffness_n_per_m = gain * solid.stiffness_n_per_m
     stretch_m = stretched_m(proxy) if contact.depth_m > 0.0 else 0.0
     if dt_s > 0.0:
-        taken_j = -normal.applied_n * normal.way_m - first.applied_n * first.way_m - second.applied_n * second.way_m
-        spring_j = -normal.held_n * normal.way_m - first.held_n * first.way_m - second.held_n * second.way_m
+        taken_j = spring_j = 0.0
+        for channel in channels:
+            taken_j -= channel.mean_n * channel.way_m
+            spring_j -= channel.mean_spring_n * channel.way_m
         lost_j = stiffness_n_per_m * proxy.lost_m2
         ledger = contact.ledger
         stored_j = gain * solid.stored_j(stretch_m, limit_n)
@@ -229,8 +245,7 @@ def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: 
     if solid.stiffness_n_per_m * stretch_m > limit_n:
         held *= limit_n / (solid.stiffness_n_per_m * stretch_m)
     for channel in channels:
-        channel.apply(share)
-        channel.held_n = held * channel.wall.spring_n
+        channel.apply(share, held * channel.wall.spring_n)
 
 
 def stretched_m(proxy: Any) -> float:

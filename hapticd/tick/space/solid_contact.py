@@ -108,7 +108,9 @@ class SolidContact:
     @property
     def faded(self) -> bool:
         """Whether nothing is left of its force, nor to book."""
-        return self.quiet or not any(channel.blending or channel.applied_n != 0.0 for channel in self.channels)
+        return self.quiet or not any(
+            channel.blending or channel.applied_n != 0.0 or channel.applied_sum != 0.0 for channel in self.channels
+        )
 
     def reach(self) -> Proxy:
         """What tells where the device may touch it, until its proxy is another."""
@@ -135,7 +137,9 @@ class SolidContact:
         shade.let_go(inf, 1.0)
         for of, channel in zip(self.channels, shade.channels, strict=False):
             channel.dx, channel.dy, channel.dz = of.dx, of.dy, of.dz
-            channel.in_contact, channel.x_m, channel.applied_n = of.in_contact, of.x_m, of.applied_n
+            channel.in_contact, channel.x_m = of.in_contact, of.x_m
+            channel.applied_n = channel.mean_n = of.applied_n
+            channel.waited, channel.applied_sum = of.waited, of.applied_sum
         shade.depth_m = self.depth_m
         shade.grip, shade.sides = self.grip, self.sides
         shade.quiet = False
@@ -309,18 +313,16 @@ class SolidContact:
         if dt_s > 0.0:
             self.ledger.update(
                 self._moved_m,
-                normal.applied_n,
-                normal.held_n,
+                normal.mean_n,
+                normal.mean_spring_n,
                 gain * solid.stored_j(depth_m, limit_n),
                 normal.in_contact,
                 normal.damping_n_s_per_m,
                 dt_s,
             )
-        normal.apply(share)
-        if depth_m > 0.0:
-            spring_n = solid.stiffness_n_per_m * depth_m
-            normal.held_n = gain * (spring_n if spring_n <= limit_n else limit_n)
-        else:
+        spring_n = solid.stiffness_n_per_m * depth_m
+        normal.apply(share, gain * (spring_n if spring_n <= limit_n else limit_n))
+        if depth_m == 0.0:
             self._rest()
 
     @property
@@ -338,7 +340,6 @@ class SolidContact:
 
         By that sample no force is held any more, with which the ledger ends the touch.
         """
-        self.normal.held_n = 0.0
         self.quiet = self._outside_s > (0.0 if self.normal.law.rests else OUTSIDE_S)
 
     def _lose(self, velocity: Vector, way: Vector, dt_s: float) -> bool:
@@ -364,7 +365,7 @@ class SolidContact:
         for channel in self.channels[: self.sides]:
             channel.in_contact = depth_m > 0.0
         self.normal.x_of_law_m = -depth_m
-        self.normal.held_n = self._moved_m = self._outside_s = 0.0
+        self._moved_m = self._outside_s = 0.0
         self._away = False
         self._face()
         self.quiet = depth_m == 0.0 and self.ledger.stored_j == 0.0

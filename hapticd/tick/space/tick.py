@@ -50,6 +50,7 @@ class SpaceTick(ControlTick):
         awake: those that the device may touch, and those that fade out.
         held: of those awake the ones whose force a tick without news holds.
         fading: those that are gone and whose force still fades out.
+        moving: those that clients move.
         at_m: where the last sample was that had news [m].
         nearby: which solids are in reach.
         books: of all objects together.
@@ -83,6 +84,7 @@ class SpaceTick(ControlTick):
         self.books = SpaceBooks()
         self.fading: list[SolidContact] = []
         self.held: list[SolidContact] = []
+        self.moving: list[RemoteContact] = []
         self.at_m: Vector = (0.0, 0.0, 0.0)
         self._take_solids()
         if info.start_m:
@@ -230,6 +232,8 @@ class SpaceTick(ControlTick):
                 waiting.hold(periods)
             for solid in held:
                 solid.hold(periods)
+            for moving in self.moving:
+                moving.wait(passed_s)
         for contact in contacts:
             wall = contact.wall
             force_n[wall.axis] += wall.outward * contact.force_n
@@ -328,7 +332,8 @@ class SpaceTick(ControlTick):
     def _take_solids(self) -> None:
         """Run what the scene needs from now on."""
         self.nearby = Nearby([contact.reach() for contact in self.solids])
-        self.ports = [*(contact.port for contact in self._moving()), *self.couplings]
+        self.moving = self._moving()
+        self.ports = [*(contact.port for contact in self.moving), *self.couplings]
         self.has_ports = self.has_ports or bool(self.ports)
         self.has_objects = self.has_objects or bool(self.solids)  # and their books once they are gone
         self.advance = self.step_in_space if self.has_objects else self.step

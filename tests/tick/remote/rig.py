@@ -88,8 +88,7 @@ def update(seq: int = 0, released: bool = False, **said: Any) -> Update:
 class Rig:
     """A tick that is shown positions and told updates, and the work of the forces that it gave.
 
-    Between two samples the device has moved evenly, a tick like the next, as couplings and forces reckon; what walls
-    and objects hold counts as held since the sample before.
+    Between two samples the device has moved evenly, a tick like the next.
     """
 
     def __init__(
@@ -101,7 +100,7 @@ class Rig:
         self.sample = Sample(len(axes))
         self.at = [0.0] * len(axes)
         self.force: list[float] = [0.0] * len(axes)
-        self.pulled: list[list[float]] = []  # since the last sample, up to the last tick
+        self.pulled: list[list[float]] = []  # forces since the last sample, up to the last tick
         self.energy_j = 0.0
         self.seq = 0
         self.tick.start(self.sample)
@@ -126,11 +125,8 @@ class Rig:
         for _ in range(ticks):
             if at is not None:
                 moved = [to - of for to, of in zip(at, self.at, strict=True)]
-                self.energy_j -= sum(f * m for f, m in zip(self.force, moved, strict=True))
-                last = self.pull()
-                for each in self.pulled:
-                    more = apart_each(each, last)
-                    self.energy_j -= sum(f * m for f, m in zip(more, moved, strict=True)) / (len(self.pulled) + 1)
+                pulled = [*self.pulled, self.force]
+                self.energy_j -= sum(f * m for each in pulled for f, m in zip(each, moved, strict=True)) / len(pulled)
                 self.at = list(at)
             self.pulled = []
             self.sample.position_m[:] = self.at
@@ -142,16 +138,9 @@ class Rig:
     def repeat(self, ticks: int = 1) -> list[float]:
         """Have the device say nothing new for some ticks; the force."""
         for _ in range(ticks):
-            self.pulled.append(self.pull())
+            self.pulled.append(self.force)
             self.force = list(self.tick.advance(self.sample, PERIOD_S))
         return self.force
-
-    def pull(self) -> list[float]:
-        """What couplings and forces apply, those that fade out too."""
-        force_n = [0.0] * len(self.at)
-        for axis in self.tick.own_ports.axes:
-            force_n[axis.wall.axis] += axis.applied_n
-        return force_n
 
     def switch(self, scene: str | None = None, law: str | None = None) -> None:
         """Reload another scene, or another law, without a tick in between."""
