@@ -17,7 +17,6 @@ LONGEST = (
     "tests/daemon/test_walls.py",
     "tests/drivers/moteus/test_daemon.py",
     "tests/drivers/odrive/test_daemon.py",
-    "tests/cli/test_commands.py",
     "tests/daemon/test_space_presses.py",
     "tests/drivers/forcedimension/test_states.py",
     "tests/daemon/test_commands.py",
