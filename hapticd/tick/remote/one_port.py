@@ -114,10 +114,8 @@ class OnePort(Port):
                 channel.wake(True)
 
     def stand(self) -> None:
-        """Be without force and without a client, where the device is now; a client that was in force is told so."""
-        if self.state is _HELD:
-            self._become(PortState.STALE)
-        self.forget()
+        """Be without force and without a client, where the device is now; an event tells of one that was in force."""
+        self.lose_client()
         self._sleep()
 
     def leave(self) -> None:

@@ -98,6 +98,12 @@ class Port:
             if self.state is not _HELD:
                 self._become(_HELD)
 
+    def lose_client(self) -> None:
+        """Know nothing of a client until it says something anew, and tell of one that was in force."""
+        if self.state is _HELD:
+            self._become(_STALE)
+        self.forget()
+
     def forget(self) -> None:
         """Know nothing of a client until it says something anew."""
         self.state = PortState.IDLE

@@ -11,7 +11,7 @@ from hapticd.shapes.pose import Pose, Vector
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.remote.follower import Follower
-from hapticd.tick.remote.port import Port, PortState
+from hapticd.tick.remote.port import Port
 from hapticd.tick.remote.turning import Turning, unit
 from hapticd.tick.remote.update import DAMPING, ORIENTATION, POSITION, STIFFNESS, TURNING, VELOCITY, Update
 from hapticd.tick.space.channel import Channel, stretched_m
@@ -81,10 +81,8 @@ class RemoteObject(Port):
         self._damping = solid.damping_n_s_per_m
 
     def stand(self) -> None:
-        """Stay where it is, without a client; one that was in force is told so."""
-        if self.state is PortState.HELD:
-            self._become(PortState.STALE)
-        self.forget()
+        """Stay where it is, without a client; an event tells of one that was in force."""
+        self.lose_client()
         self.stop()
 
     def stop(self, position_m: Vector | None = None) -> None:

@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import pytest
+
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.device import DeviceInfo, Sample
 from hapticd.tick.assemble import make_tick
-from hapticd.tick.contact import RunningLaw
+from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.remote.port import Port
 from hapticd.tick.remote.update import (
     DAMPING,
@@ -22,6 +24,7 @@ from hapticd.tick.remote.update import (
     VELOCITY,
     Update,
 )
+from tests.tick.rig import law
 
 PERIOD_S = 1e-3
 RAMP_S = 0.05
@@ -83,6 +86,27 @@ def update(seq: int = 0, released: bool = False, **said: Any) -> Update:
     if released:
         made.said |= RELEASED
     return made
+
+
+class Metered:
+    """A law that adds nothing to a contact's own force, and counts the work of what it is told was applied.
+
+    Args:
+        contact: gets it.
+
+    Attributes:
+        taken_j: work into the contact so far [J].
+    """
+
+    def __init__(self, contact: Contact) -> None:
+        self.taken_j = 0.0
+        module = law(self._step)
+        contact.law = RunningLaw(module, module.Params())
+
+    def _step(self, _state: Any, _params: Any, tick: Any) -> float:
+        self.taken_j -= tick.applied_n * tick.moved_m
+        assert tick.applied_contact_n == pytest.approx(tick.applied_n)
+        return float(tick.contact_n)
 
 
 class Rig:

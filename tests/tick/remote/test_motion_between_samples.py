@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import pytest
 
-from hapticd.tick.contact import RunningLaw
-from tests.tick.remote.rig import COUPLING, FORCE_PORT, PERIOD_S, PROMPT, Rig
-from tests.tick.rig import law
+from tests.tick.remote.rig import COUPLING, FORCE_PORT, PERIOD_S, PROMPT, Metered, Rig
 
 SPEED_M_PER_S = 0.1
 FIELD = FORCE_PORT + "unchanged_s = 0.0\n"
@@ -48,19 +45,10 @@ def test_the_books_have_what_each_force_took_while_it_was_held(gap: int, along: 
 @pytest.mark.parametrize("gap", [1, 2, 20])
 @pytest.mark.parametrize("scene", [COUPLING + PROMPT, FIELD])
 def test_a_law_sees_the_mean_of_what_was_applied_since_the_sample_before(gap: int, scene: str) -> None:
-    taken_j = 0.0
-
-    def step(_state: Any, _params: Any, tick: Any) -> float:
-        nonlocal taken_j
-        taken_j -= tick.applied_n * tick.moved_m
-        assert tick.applied_contact_n == pytest.approx(tick.applied_n)
-        return float(tick.contact_n)
-
     rig = Rig(scene, nominal_rate_hz=1000.0 / gap)
-    module = law(step)
-    rig.ports[0].channels[0].law = RunningLaw(module, module.Params())  # type: ignore[attr-defined]  # not an object
+    metered = Metered(rig.tick.couplings[0].channels[0])
     went_in_j = stroke(rig, gap, SPEED_M_PER_S)
-    assert taken_j == pytest.approx(went_in_j, rel=1e-9)
+    assert metered.taken_j == pytest.approx(went_in_j, rel=1e-9)
 
 
 def test_what_fades_out_between_two_samples_is_entered_with_the_second() -> None:

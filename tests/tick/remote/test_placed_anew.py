@@ -1,4 +1,4 @@
-"""A device that is tared, or found again, places everything anew: who drove a port is told that it was let go."""
+"""When the device is tared, calibrated or found again, every client is let go, and an event says so."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A client that is silent is let go by a ramp, and each silence is told of, at most once a second."""
+"""A silent client is let go by a ramp, with one event a second at most."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ STALE_AND_BACK = [PortState.STALE, PortState.HELD]
 
 
 def events(rig: Rig, ticks: int, apart_ticks: int = 1) -> list[tuple[int, PortState]]:
-    """What is told in these ticks, and in which of them, on a device whose samples are so far apart."""
+    """The events of these ticks, each with its tick; the device has a sample every `apart_ticks`."""
     found = []
     for n in range(ticks):
         rig.repeat() if n % apart_ticks else rig.go(dt_s=apart_ticks * PERIOD_S)

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from hapticd.tick.contact import RunningLaw
-from tests.tick.remote.rig import PERIOD_S, Rig
-from tests.tick.rig import law as law_of
+from hapticd.tick.space.tick import SpaceTick
+from tests.tick.remote.rig import PERIOD_S, Metered, Rig
 from tests.tick.space.rig import ball, table
 
 ROUGH: dict[str, Any] = {"static_friction": 0.7, "dynamic_friction": 0.5}
@@ -84,17 +83,9 @@ def test_a_clients_impulse_is_that_of_each_force_for_as_long_as_it_was_held(roug
 
 @pytest.mark.parametrize("gap", [1, 10])
 def test_a_law_is_shown_the_mean_of_what_was_applied(gap: int) -> None:
-    taken_j = 0.0
-
-    def step(_state: Any, _params: Any, tick: Any) -> float:
-        nonlocal taken_j
-        taken_j -= tick.applied_n * tick.moved_m
-        assert tick.applied_contact_n == pytest.approx(tick.applied_n)
-        return float(tick.contact_n)
-
     rig = Rig(SCENES["a ball"], axes="xyz", nominal_rate_hz=1000.0 / gap)
-    module = law_of(step)
-    rig.tick.solids[0].normal.law = RunningLaw(module, module.Params())  # type: ignore[attr-defined]  # it has objects
+    assert isinstance(rig.tick, SpaceTick)
+    metered = Metered(rig.tick.solids[0].normal)
     rig.go([0.0, 0.0, 0.031])
     for n in range(1, 301):
         if n == 103:
@@ -104,4 +95,4 @@ def test_a_law_is_shown_the_mean_of_what_was_applied(gap: int) -> None:
         else:
             rig.go([0.0, 0.0, 0.031 - 2e-5 * n], dt_s=gap * PERIOD_S)
     assert rig.energy_j > 1e-4
-    assert taken_j == pytest.approx(rig.energy_j, rel=1e-9)
+    assert metered.taken_j == pytest.approx(rig.energy_j, rel=1e-9)

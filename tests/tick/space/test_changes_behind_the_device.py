@@ -49,7 +49,7 @@ def test_an_object_that_a_reload_puts_behind_a_free_device_does_not_hold_it(z: f
 
 @pytest.mark.parametrize("before", ["", ball("far", position_m=(0.5, 0.0, 0.0))], ids=["empty", "another far away"])
 def test_a_new_object_comes_in_by_a_ramp_where_the_device_is_now(before: str) -> None:
-    """Without objects nobody kept where the device is: the first began where it had been armed, 10 N in one tick."""
+    """The first object took the device to be where it had been armed, and gave 10 N in one tick."""
     here = (0.0, 0.0, 0.028)
     rig = Rig(before, "none").start((0.0, 0.0, 0.1)).to(here, 100)
     rig.switch(before + ball()).forces.clear()

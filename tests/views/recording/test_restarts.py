@@ -27,7 +27,7 @@ BEFORE = range(300)
 
 
 def ticked(began_s: float, seqs: range) -> list[Sent]:
-    """Ticks at 1 kHz of a daemon that began to count so long after the first one [s]."""
+    """Ticks at 1 kHz of a daemon that was started `began_s` after the first one [s]."""
     dice = random.Random(1)
     return [replace(one, timestamp=BEGAN_S + began_s + seq * 1e-3) for seq in seqs for one in tick(seq, dice)]
 
