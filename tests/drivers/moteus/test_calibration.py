@@ -17,6 +17,7 @@ from tests.drivers.moteus.controller import COUNTS_PER_TURN
 from tests.drivers.moteus.lab import Lab, axes
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
+from tests.drivers.motors.shaft_clock import move_by_the_shaft
 from tests.drivers.motors.wire import Frames
 
 BOUND_N = 0.5
@@ -27,6 +28,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
     monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
     with Lab("fdcanusb", tmp_path, 1, monkeypatch) as made:
         made.first.shaft.x_m = -0.035
+        move_by_the_shaft(made.first.shaft, monkeypatch)
         yield made
 
 
@@ -74,11 +76,14 @@ def test_a_home_that_is_remembered_means_the_same_when_it_would_be_found_otherwi
     home_m = bench.first.shaft.x_m if before == "here" else 0.02
     with opened(bench, homing=before, home_m=home_m) as driver:
         driver.calibrate()
+        # What is home "here" is where the handle rests after it was nudged both ways.
+        beside_m = driver.read().position_m[0] - bench.first.shaft.x_m if before == "here" else 0.0
+        assert abs(beside_m) < 5e-3
     with bench.driver(axes=axes(1, homing=after, home_m=home_m)) as again:
         again._state_wait_s = PATIENCE_S
         sample = again.read()
         assert sample.calibrated
-        assert sample.position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=2e-4)
+        assert sample.position_m[0] == pytest.approx(bench.first.shaft.x_m + beside_m, abs=2e-4)
 
 
 def lose_homes(bench: Lab, monkeypatch: pytest.MonkeyPatch, most: int) -> list[bytes]:
@@ -122,6 +127,7 @@ def test_a_home_that_is_where_it_was_is_taken(bench: Lab, part_of_a_count: float
 def test_a_home_that_is_not_taken_leaves_none(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     driver = opened(bench, homing="here")
     driver.calibrate()
+    bench.first.shaft.x_m += 0.01  # else its home could be where it was, which is no other
     monkeypatch.setattr(crew, "GREETING_PATIENCE_S", 0.3)
     lose_homes(bench, monkeypatch, 1000)
     with pytest.raises(DeviceProtocolError, match="has not taken its home"):
