@@ -41,7 +41,9 @@ TICKS = 1500
 READER = """
 import json, sys, time
 import pylsl
-assert abs(pylsl.local_clock() - time.monotonic()) < 1e-3
+before = time.monotonic()
+clock = pylsl.local_clock()
+assert before - 1e-3 < clock < time.monotonic() + 1e-3, "another clock"
 inlets = []
 for what in ("ticks", "events"):
     found = pylsl.resolve_byprop("name", "hapticd-default-" + what, timeout=60.0)
@@ -92,8 +94,7 @@ def streamed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any
         bridge_command = [HAPTICD, "lsl", "--json"]
         reader_command = [sys.executable, "-c", READER.replace("TICKS", str(TICKS))]
         with running(bridge_command, environment) as bridge, running(reader_command, environment) as reader:
-            assert reader.stdout is not None
-            assert reader.stdout.readline() == "open\n"
+            await_open(reader)
             with Subscriber(daemon.endpoint, "hapticd/timing") as subscriber:
                 maps = subscriber.maps()
                 deadlines_ns: dict[int, int] = {}
@@ -130,6 +131,13 @@ def running(command: list[str], environment: dict[str, str]) -> Iterator[subproc
             yield process
         finally:
             process.kill()
+
+
+def await_open(reader: subprocess.Popen[str]) -> None:
+    """Return when a reader has its inlets; one that ends instead says why."""
+    assert reader.stdout is not None
+    if reader.stdout.readline() != "open\n":
+        pytest.fail(f"the reader has ended: {reader.communicate(timeout=PATIENCE_S)[1]}")
 
 
 def test_every_tick_arrives_in_order(streamed: dict[str, Any]) -> None:
@@ -193,8 +201,7 @@ def test_after_a_reload_of_every_ticks_the_stream_has_the_new_rate_and_its_reade
     with Daemon(config).wait_ready() as daemon:
         environment = surroundings(daemon, tmp_path)
         with running([HAPTICD, "lsl"], environment), running([sys.executable, "-c", RELOADED], environment) as reader:
-            assert reader.stdout is not None
-            assert reader.stdout.readline() == "open\n"
+            await_open(reader)
             daemon.config.write_text(config.replace("[telemetry]\n", "[telemetry]\nevery_ticks = 10\n"))
             assert daemon.ask("reload") == ""
             told, complained = reader.communicate(timeout=3 * PATIENCE_S)
