@@ -6,7 +6,9 @@ A slot a port:
 
 The word `REMOTE` counts the updates written, so that a tick in which there was none compares one number. `list_of`
 numbers the list of ports that an update is for, the same on either side: after a reload an update for the list before
-is not taken for another name.
+is not taken for another name. Which of the two sides goes over to another list first is not known: until the other one
+has, an update for the list before is for the port that goes on under its name, and what is written by then for any
+other list is nobody's.
 """
 
 from __future__ import annotations
@@ -53,13 +55,23 @@ class SlotReader:
         self._counters = [0] * MOST_PORTS
         self._ports: Sequence[Port] = ()
         self._list = 0
+        self._heirs: list[Port | None] = []  # of the ports of the list before
+        self._list_before = 0
         self._update = Update()
 
     def serve(self, ports: Sequence[Port]) -> None:
-        """Take updates for these ports from now on."""
+        """Take updates for these ports from now on; of what was written before only what has yet to be taken."""
+        number = list_of((port.name, port.kind) for port in ports)
+        if number != self._list:
+            self.take()
+            goes_on = {(port.name, port.kind): port for port in ports}
+            self._heirs = [goes_on.get((port.name, port.kind)) for port in self._ports]
+            self._list_before = self._list
+            for index in range(MOST_PORTS):  # clients that have gone may have said it
+                self._counters[index] = self._words[index * _WORDS]
         self._ports = ports
-        self._list = list_of((port.name, port.kind) for port in ports)
-        self._shared.words[PORTS] = self._list
+        self._list = number
+        self._shared.words[PORTS] = number
 
     def take(self) -> None:
         """Hand each port what was said of it since the last time; what is just being written waits for the next."""
@@ -68,7 +80,7 @@ class SlotReader:
         counters = self._counters
         update = self._update
         whole = True
-        for index, port in enumerate(self._ports):
+        for index in range(max(len(self._ports), len(self._heirs))):
             at = index * _WORDS
             counter = words[at]
             if counter == counters[index]:
@@ -80,10 +92,20 @@ class SlotReader:
                 whole = False
                 continue
             counters[index] = counter
-            if meant == self._list:
+            port = self._meant(meant, index)
+            if port is not None:
                 port.take(update)
         if whole:
             self.seen = written
+
+    def _meant(self, ports_list: int, index: int) -> Port | None:
+        """The port that an update for a list is for."""
+        ports: Sequence[Port | None] = ()
+        if ports_list == self._list:
+            ports = self._ports
+        elif ports_list == self._list_before:
+            ports = self._heirs
+        return ports[index] if index < len(ports) else None
 
 
 class SlotWriter:

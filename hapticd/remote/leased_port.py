@@ -133,7 +133,8 @@ class LeasedPort:
                     self.round_trips.add((tick - state_seq) * period_ns)
 
     def _release(self, now_ns: int) -> bool:
-        if self.owner is None:
+        """Have the loop let go, of what a client whose lease has ended holds as well; whether it is yet to be told."""
+        if self.update.said & RELEASED:
             return False
         self.owner = None
         self.update.said |= RELEASED

@@ -175,21 +175,60 @@ def test_the_word_that_guards_a_slot_is_odd_while_it_is_written_and_only_ever_ri
         assert shared.remote_words[0] == 2 * (number + 1)
 
 
-def test_an_update_for_another_list_of_ports_is_taken_for_no_name(
+def test_an_update_for_another_list_of_ports_is_taken_for_no_other_name(
     shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
 ) -> None:
     before = SlotWriter(shared, PORTS)
     assert before.in_force
     reader.serve([ports[1], ports[0]])
-    before.write(0, at(0.1))  # meant for the tool
+    before.write(0, at(0.1))  # meant for the tool, which goes on
     reader.take()
-    assert ports[0].heard == ports[1].heard == []
+    assert [len(port.heard) for port in ports] == [1, 0]
     assert not before.in_force
     after = SlotWriter(shared, reversed(PORTS))
     assert after.in_force
     after.write(0, at(0.2))
     reader.take()
     assert len(ports[1].heard) == 1
+
+
+def test_what_was_said_to_a_port_that_has_gone_is_not_heard_when_it_comes_back(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
+) -> None:
+    """Its client may have gone since: one that was killed had a coupling pull the hand 19 mm away."""
+    writer = SlotWriter(shared, PORTS)
+    for there in ([], ports[:1]):
+        reader.serve(there)
+        writer.write(1, at(0.1))  # before the other side knows that it has gone
+        reader.take()
+        reader.serve(ports)
+        reader.take()
+        assert ports[1].heard == []
+    writer.write(1, at(0.2))
+    reader.take()
+    assert len(ports[1].heard) == 1
+
+
+def test_what_is_said_while_another_port_comes_reaches_the_one_that_stays(
+    shared: SharedMemory, ports: list[HeardPort]
+) -> None:
+    """A release, which is said once: it was dropped, and the force stayed until the port's time was over."""
+    reader = SlotReader(shared)
+    reader.serve(ports[1:])
+    writer = SlotWriter(shared, PORTS[1:])
+    writer.write(0, at(0.1))
+    reader.serve(ports)
+    writer.write(0, at(0.2))
+    reader.take()
+    assert [len(port.heard) for port in ports] == [0, 2]
+
+
+def test_a_new_loop_hears_nothing_that_was_said_to_the_one_before(shared: SharedMemory, ports: list[HeardPort]) -> None:
+    SlotWriter(shared, PORTS).write(0, at(0.1))
+    reader = SlotReader(shared)
+    reader.serve(ports)
+    reader.take()
+    assert ports[0].heard == []
 
 
 def test_lists_are_told_apart_by_names_kinds_and_order() -> None:

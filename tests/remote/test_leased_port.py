@@ -42,6 +42,22 @@ def test_the_first_to_speak_owns_the_name_until_it_has_been_silent_for_long(port
         say(port, ONE, 2001, 3)
 
 
+def test_one_whose_lease_has_ended_lets_go_all_the_same(port: LeasedPort) -> None:
+    """The loop may hold it on, for `hold_s`: leaving the `with` of a client left 2.9 N."""
+    say(port, ONE, 0, 1)
+    assert port.owner_at(1500 * MS) is None
+    assert port.take({"release": True}, ONE, 1, 1500 * MS)
+    assert port.update.said & RELEASED
+    assert not port.take({"release": True}, ONE, 1, 1501 * MS)
+    assert say(port, ONE, 1502, 2)
+
+
+def test_a_release_is_handed_on_by_one_that_has_heard_nothing_before(port: LeasedPort) -> None:
+    """As after a start anew: what was said to the one before may be in force."""
+    assert port.take({"release": True}, ONE, 1, MS)
+    assert port.update.said == RELEASED
+
+
 def test_another_owner_begins_with_nothing_said(port: LeasedPort) -> None:
     say(port, ONE, 0, 900, stiffness_n_per_m=100.0)
     assert say(port, TWO, 1500, 1)

@@ -28,7 +28,7 @@ class Port:
         limits: in force now.
         state: how it stands with its client.
         seq: the client's own number of the message that is in force; -1: none is.
-        age_s: how long ago the last one was taken [s].
+        age_s: how long ago the last one came into force [s].
         force_n: force on the device that was applied last, one element an axis [N].
         impulse_n_s: the sum of the port's own force times how long it was applied, since the port exists. The law's
             damping is in it where it acts against the target; against the ground, its reaction is no client's [N s].
@@ -88,12 +88,12 @@ class Port:
         Args:
             update: of this port; numbers beyond the port's limits count as the limit.
         """
-        self.age_s = 0.0
         if update.said & RELEASED:
             if self.state is _HELD:
                 self._become(_RELEASED)
             return
-        if self._hear(update):
+        if self._hear(update):  # else it holds nothing: what another client has said before grows old
+            self.age_s = 0.0
             self.seq = update.seq
             if self.state is not _HELD:
                 self._become(_HELD)

@@ -37,6 +37,17 @@ def test_a_client_that_is_silent_is_let_go_by_a_ramp_and_told_of_once() -> None:
     assert rig["tool"].seq == -1
 
 
+def test_another_client_that_names_no_target_keeps_none_in_force() -> None:
+    """The one before was killed, and its target held the hand for as long as the other asked for a softer spring."""
+    rig = Rig()
+    held_at(rig, [2e-3], 300)
+    for _ in range(400):
+        rig.say("tool", stiffness_n_per_m=1000.0)
+        rig.go()
+    assert rig.force == [0.0]
+    assert rig["tool"].state is PortState.STALE
+
+
 @pytest.mark.parametrize("law", ["late-cycle", "none"])
 @pytest.mark.parametrize("silence", [110, 130, 149, 151, 400])
 def test_it_comes_back_by_a_ramp_wherever_the_silence_ended(silence: int, law: str) -> None:
