@@ -30,26 +30,34 @@ class Params(LawParams):
 
 
 class State:
-    """The wall's force before it is taken ahead."""
+    """The wall's force before it is taken ahead, and whether it is still to be found in a contact that goes on."""
 
     environment_n: float
+    takes_over: bool
 
 
 def start(state: Any, params: Any, snapshot: Any) -> None:
-    """Nothing to take over."""
+    """A contact that goes on is taken over as it would be at rest: without a rate of its force."""
     state.environment_n = 0.0
+    state.takes_over = True
 
 
 def step(state: Any, params: Any, tick: Any) -> float:
     """The force of the wall that gave way, taken ahead.  -> force on the device [N]."""
     if not tick.in_contact:
         state.environment_n = 0.0
+        state.takes_over = False
         return 0.0
     wall_n_per_m = max(SOFTEST, min(-tick.spring_n / tick.x_m, STIFFEST))
+    inside = tick.x_m < 0.0  # a spring along a surface may be stretched either way
+    if state.takes_over:
+        state.takes_over = False
+        if (tick.x_m - tick.moved_m < 0.0) == inside:  # at rest F_e = -k (x + F_e / mu)
+            state.environment_n = -wall_n_per_m * tick.x_m * params.slope_ratio / (1.0 + params.slope_ratio)
     # the sum of (v - u) dt since the contact began; u has the force of the last sample, for F_e(n) needs u(n)
     contact_m = tick.x_m + state.environment_n / (params.slope_ratio * wall_n_per_m)
     environment_n = 0.0
-    if contact_m < 0.0:
+    if (contact_m < 0.0) == inside:
         environment_n = -wall_n_per_m * contact_m
     rate_n_per_s = (environment_n - state.environment_n) / tick.dt_s
     state.environment_n = environment_n

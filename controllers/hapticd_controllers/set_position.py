@@ -67,7 +67,9 @@ def step(state: Any, params: Any, tick: Any) -> float:
         state.energy_j = min(budget_j - asked_j, LIMIT)
     else:
         state.energy_j = min(0.0, budget_j)
-        state.set_position_m = tick.x_m + math.sqrt(2.0 * max(0.0, budget_j) / wall_n_per_m)
+        reach_m = math.sqrt(2.0 * max(0.0, budget_j) / wall_n_per_m)
+        # a spring along a surface may be stretched either way
+        state.set_position_m = tick.x_m + reach_m if tick.x_m < 0.0 else tick.x_m - reach_m
     force_n: float = tick.contact_n - tick.spring_n  # the wall's own damping is passed on as it is
     force_n += wall_n_per_m * (state.set_position_m - tick.x_m) - braking * tick.velocity_m_per_s
     return force_n

@@ -53,6 +53,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
     proxy_m = pushed_n / (wall_n_per_m + spring_n_per_m + damper_n_per_m)
     state.proxy_m = proxy_m
     force_n: float = tick.contact_n - tick.spring_n
-    if proxy_m < 0.0:  # a wall only pushes: a proxy that the device pulls away from it is free
+    # A wall only pushes: a proxy that the device pulls away from it is free. Along a surface either way is inside.
+    if (proxy_m < 0.0) == (tick.x_m < 0.0):
         force_n -= wall_n_per_m * proxy_m
     return force_n

@@ -258,7 +258,8 @@ class SolidContact:
             self._ux, self._uy, self._uz = normal.dx, normal.dy, normal.dz
             self.turned = False
             for channel in self.channels[: self.sides]:
-                channel.law.start(channel.snapshot())
+                if channel.law.publishes_mass:
+                    channel.law.start(channel.snapshot())
         for channel in self.channels[: self.sides]:
             channel.act(periods)
 

@@ -1,0 +1,62 @@
+"""A surface that turns by 20 degrees under a hand: a law forgets the mass that it has felt, and no force steps."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+
+import pytest
+
+from hapticd import plugins
+from tests.tick.space.rig import INFO, Rig, ball
+
+REAL = dataclasses.replace(INFO, simulated=False, host_silence_ms=20.0)
+CLIMB_RAD = 1e-3
+
+
+@pytest.mark.parametrize("stiffness_n_per_m", [1000.0, 9000.0])
+@pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
+def test_no_law_steps_where_a_hand_slides_round_a_ball(law: str, stiffness_n_per_m: float) -> None:
+    """With some the force vanished at 20 degrees, with one it went from 12 N to -12 N and back in each tick."""
+    rig = Rig(ball(stiffness=stiffness_n_per_m), law, info=REAL).start((0.0, 0.0, 0.0305))
+    rig.to((0.0, 0.0, 0.029), 75).go(*(150 * [(0.0, 0.0, 0.029)]))
+    still = len(rig.forces)
+    angles = [CLIMB_RAD * n for n in range(1, 1001)]
+    rig.go(*((0.029 * math.sin(angle), 0.0, 0.029 * math.cos(angle)) for angle in angles))
+    sliding = rig.forces[still - 1 :]
+    largest_n = max(math.hypot(*force_n) for force_n in sliding)
+    assert math.degrees(angles[-1]) > 40.0
+    # A damper that begins as the hand does, and the turn of the force itself.
+    assert max(map(math.dist, sliding, sliding[1:])) <= 2.0 * CLIMB_RAD * largest_n + 0.01
+
+
+@pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
+def test_friction_holds_alike_to_all_sides(law: str) -> None:
+    """A spring along the surface is stretched either way; two laws had none where it was stretched to one side."""
+    box = "size_m = [0.2, 0.2, 0.02]\nposition_m = [0.0, 0.0, -0.01]\nstatic_friction = 0.8\ndynamic_friction = 0.6\n"
+    scene = f'[[scene.objects]]\nname = "box"\nshape = "box"\nstiffness_n_per_m = 2000.0\n{box}'
+    held = []
+    for x, y in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+        rig = Rig(scene, law, info=REAL).start((0.0, 0.0, 0.001)).to((0.0, 0.0, -0.002), 300).to((0.0, 0.0, -0.002), 50)
+        rig.to((1e-3 * x, 1e-3 * y, -0.002), 200).to((1e-3 * x, 1e-3 * y, -0.002), 200)
+        held.append(-(x * rig.force[0] + y * rig.force[1]))
+    assert held == pytest.approx([held[0]] * 4, abs=1e-6)
+    assert held[0] > 1.0
+
+
+def test_a_fading_object_does_not_come_back_where_a_lost_position_is_known_again() -> None:
+    """It was taken off while the hand pressed it with 4 N; armed before that was known again it stepped to 3.3 N."""
+    at = (0.0, 0.0, 0.0292)
+    rig = Rig(ball(), "none", info=REAL).start((0.0, 0.0, 0.031)).to(at, 60).go(*(5 * [at]))
+    rig.switch("").go(*(10 * [at]))
+    assert rig.force[2] == pytest.approx(3.28)
+    rig.go(*(40 * [(math.nan, math.nan, math.nan)]))
+    assert rig.force == (0.0, 0.0, 0.0)
+    rig.tick.fault = 0
+    rig.tick.guard.clear()
+    assert rig.tick.arm()
+    seen = len(rig.forces)
+    rig.go(*(100 * [at]))
+    assert set(itertools.chain(*rig.forces[seen:])) == {0.0}
+    assert not rig.tick.fading
