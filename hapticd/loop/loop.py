@@ -185,11 +185,10 @@ class ControlLoop:
             if words[DISARM] != words[DISARMED]:
                 session.disarm()
             if words[REQUESTS] != words[ANSWERED]:
-                asked_ns = monotonic_ns()
                 requests.work()
-                slice_ns = monotonic_ns() - asked_ns
-                if slice_ns > period_ns:  # a law's start is anybody's code
-                    tick.begin_late(slice_ns * 1e-9)
+                late_ns = monotonic_ns() - read_ns
+                if late_ns > period_ns:  # a law's start is anybody's code, and a write may have stood still
+                    tick.begin_late(late_ns * 1e-9)
                 wait = self._waiting()
             if session.stop_requested and not self._stopping:
                 self._stopping = True
@@ -235,6 +234,7 @@ class ControlLoop:
                         f"the law computed for more than {budget_ns * 1e-3:.0f} us in {BUDGET_MISSES} of "
                         f"{BUDGET_TICKS} ticks",
                     )
+                    tick.begin_late((now_ns - read_ns) * 1e-9)
                     session.report_fault()
                 tick.law_clock = time.thread_time_ns if budget.watched else None
                 tick.law_ns = 0

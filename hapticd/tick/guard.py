@@ -56,7 +56,12 @@ def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: in
 
 
 def begin_late(state: Any, periods: float) -> None:
-    """Have a transition that no tick has seen yet begin so many periods after the last one, and not right with it."""
+    """Have a transition that no tick has seen yet begin so many periods after the last one, and not right with it.
+
+    Args:
+        state: the fields of `BlendFields`.
+        periods: in periods of the loop; endless: with the tick that sees it first, however late that is.
+    """
     if state.blending and state.blend_tick < 0.0:
         state.blend_tick = -1.0 - periods
 
@@ -68,7 +73,8 @@ def blended(state: Any, x_m: float, force_n: float, periods: float) -> float:
 
     The old force is held, and let out with the depth, so that nothing is left of it where contact ends. The new one
     is taken up to the limit only: a wall that asks for ten times the limit must not come in ten times as fast. When
-    w is 1 that bound opens over N more ticks, which matters only where several walls share the limit.
+    w is 1 that bound opens at the same rate, by the limit over each N ticks, until the force is within it: that matters
+    only where several walls share the limit.
 
     From tick to tick F changes by at most 2 limit / N, and by what the motion changes of F_new and of x / x_old.
 
@@ -79,16 +85,16 @@ def blended(state: Any, x_m: float, force_n: float, periods: float) -> float:
         periods: time since the last tick, in periods of the loop; more than one where deadlines were skipped.
     """
     done: float = state.blend_tick + periods
-    if done < 0.0:  # the first tick was sooner than a period after it was asked for: begun it has all the same
+    if not done >= 0.0:  # the first tick comes sooner than that: begun it has all the same
         done = 0.0
     state.blend_tick = done
     weight: float = done / state.blend_ticks
     reach_n: float = state.blend_limit_n
     if weight >= 1.0:
-        if weight >= 2.0 or -reach_n <= force_n <= reach_n:
+        reach_n = reach_n * weight
+        if -reach_n <= force_n <= reach_n:
             state.blending = False
             return force_n
-        reach_n = reach_n / (2.0 - weight)
     if force_n > reach_n:
         force_n = reach_n
     elif force_n < -reach_n:

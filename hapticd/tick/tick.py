@@ -284,8 +284,7 @@ class ControlTick:
         if self._simulated:
             return
         self.guard.begin_late(late_s)
-        for contact in (*self._under_law(), *self._fading_out(), *self.own_ports.axes):
-            begin_late(contact, late_s / self.period_s)
+        self._begin_late(late_s / self.period_s)
 
     def tare(self) -> bool:
         """Count positions from here on. False while forces are let through or it is not known where the device is."""
@@ -351,14 +350,19 @@ class ControlTick:
 
     def _change_walls(self, periods: float) -> None:
         """Bring changes of walls into force whose time has come: on a real device by a ramp."""
-        self._changing = False
+        self._changing = changed = False
         for contact in self.contacts:
             wall = contact.wall
             if wall.changes_left:
                 if wall.pass_time(periods) and not self._simulated:
                     self._blend(contact)
+                    changed = True
                 if wall.changes_left:
                     self._changing = True
+        if changed:
+            if self.guard.limited:  # the others would take a larger share of the limit at once
+                self._blend_all()
+            self._begin_late(math.inf)
 
     def _check_speed(self) -> None:
         most_m_per_s = self.guard.max_speed_m_per_s
@@ -382,13 +386,14 @@ class ControlTick:
         """Positions make sense again: stand there, at rest and without force; if armed by then, come in by a ramp."""
         self.sight.blind = False
         self._stand()
-        for contact in self._active:
-            self._blend(contact)
+        self._blend_all()
+        self._begin_late(math.inf)
 
     def _replace_laws(self, contact: Contact, error: BaseException, periods: float) -> None:
         """The law of a contact raised or returned nonsense: all are replaced, and asked again."""
         name = contact.law.module.__name__
         self.fail_law(EventCode.LAW_FAILED, f"law {name}: {in_words(error, name)}")
+        self._begin_late(math.inf)
         for each in self._active:
             each.act(periods)
 
@@ -446,8 +451,7 @@ class ControlTick:
         for contact, law in laws:
             self._take_law(contact, law)
         if self.guard.limited:  # who goes on would take a larger share of the limit at once
-            for contact in self._active:
-                self._blend(contact)
+            self._blend_all()
 
     def _gather(self) -> None:
         """Make the lists that the ticks go through."""
@@ -488,3 +492,13 @@ class ControlTick:
 
     def _blend(self, contact: Contact) -> None:
         contact.blend(self.ramp_ticks, self.guard.gain, self.guard.limit_n)
+
+    def _blend_all(self) -> None:
+        """Have all that acts on the device go over from what it applies now."""
+        for contact in self._active:
+            self._blend(contact)
+
+    def _begin_late(self, periods: float) -> None:
+        """Have the ramps that no tick has seen begin so many periods after the last one; inf: with the next."""
+        for contact in (*self._under_law(), *self._fading_out(), *self.own_ports.axes):
+            begin_late(contact, periods)

@@ -16,13 +16,14 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.driver import Driver, DriverOptions
 from hapticd.loop.loop import LATE_S, ControlLoop
 from hapticd.loop.memory import DISARM, SUPERVISOR_BEAT, SharedMemory
+from hapticd.supervisor.reload import switch_request
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.guard import BLIND_RAMP_S, Mode
 from hapticd.tick.record import RecordLayout
 from hapticd.tick.tick import ControlTick
 from tests.examples import examples
 from tests.loop.clock import Clock
-from tests.tick.rig import device, pushes, running
+from tests.tick.rig import device, law, pushes, running
 
 PERIOD_S = 1e-3
 RAMP_S = 0.05
@@ -42,6 +43,7 @@ class Slow(Driver[DriverOptions]):
         self.position_m = -5e-3
         self.calibrated = True
         self.reads_s: Iterator[float] = itertools.cycle(reads_s)
+        self.write_s = 0.0
         self._news_s = news_s
         self._sample = Sample(1)
 
@@ -61,6 +63,7 @@ class Slow(Driver[DriverOptions]):
 
     def _write(self, force_n: Sequence[float]) -> None:
         self.written.append((self.clock.now_s, force_n[0]))
+        self.clock.pass_s(self.write_s)
 
     def _disable(self) -> None: ...
 
@@ -225,3 +228,62 @@ def test_a_healthy_ramp_goes_by_even_steps(monkeypatch: pytest.MonkeyPatch) -> N
     forces_n = [force_n for at_s, force_n in bed.driver.written if at_s >= done_s][:51]
     assert forces_n == pytest.approx([5.0 * (1.0 - count / 50.0) for count in range(51)], abs=1e-9)
     assert bed.tick.guard.mode is Mode.DISARMED
+
+
+def noted(monkeypatch: pytest.MonkeyPatch, bed: Bed, method: str) -> list[float]:
+    """When a method of the tick is called, from now on [s]."""
+    called_s: list[float] = []
+    call = getattr(bed.tick, method)
+
+    def noting(*what: Any) -> None:
+        called_s.append(bed.clock.now_s)
+        call(*what)
+
+    monkeypatch.setattr(bed.tick, method, noting)
+    return called_s
+
+
+def check_rise(bed: Bed, begun_s: float, from_n: float, to_n: float) -> None:
+    """A ramp up is never further than by the time since it was begun, and arrives."""
+    forces_n = [(at_s - begun_s, force_n) for at_s, force_n in bed.driver.written if at_s > begun_s]
+    assert forces_n[0][1] == from_n
+    for passed_s, force_n in forces_n:
+        assert force_n <= from_n + (to_n - from_n) * min(passed_s / RAMP_S, 1.0) + 1e-9
+    assert max(force_n for _, force_n in forces_n) == to_n
+
+
+@pytest.mark.parametrize("write_s", [0.0, 3e-3, 8e-3, 0.02])
+def test_a_reload_counts_no_time_from_before_it_was_taken(monkeypatch: pytest.MonkeyPatch, write_s: float) -> None:
+    """A write that stood still for 30 ms before it made a step of 6.6 N of 11 in the one after it."""
+    bed = Bed(monkeypatch, [0.0])
+    bed.forgives(True)
+    taken_s = noted(monkeypatch, bed, "_take")
+    text = "[[scene.walls]]\nstiffness_n_per_m = {}.0\n[safety]\nramp_s = 0.05\n"
+    before, after = (parse(text.format(stiffness), "x") for stiffness in (1000, 2000))
+    bed.loop.requests.know(after.config.controller.law, after.law)
+    bed.driver.write_s = write_s
+    bed.run(lambda: bed.shared.post(switch_request(before, after)))
+    check_rise(bed, taken_s[0], 5.0, 10.0)
+
+
+@pytest.mark.parametrize("law_s", [0.6e-3, 3e-3, 8e-3])
+def test_the_fallback_of_a_law_that_takes_too_long_counts_no_time_from_before(
+    monkeypatch: pytest.MonkeyPatch, law_s: float
+) -> None:
+    """It holds nothing where the wall has 5 N; what it took itself was counted as the ramp's."""
+    bed = Bed(monkeypatch, [0.0])
+    bed.forgives(True)
+    failed_s = noted(monkeypatch, bed, "fail_law")
+    bed.clock.computed_ns = 0
+
+    def step(_state: Any, _params: Any, _tick: Any) -> float:
+        if bed.clock.now_s > 1.5:
+            bed.clock.pass_s(law_s)
+            assert bed.clock.computed_ns is not None
+            bed.clock.computed_ns += round(law_s * 1e9)
+        return 0.0
+
+    for _ in bed.tick.switch(make_law=running(law(step))):
+        pass
+    bed.run(lambda: None)
+    check_rise(bed, failed_s[0], 0.0, 5.0)

@@ -280,18 +280,22 @@ BLEND_FORCES = st.floats(-1e6, 1e6)
     forces_n=st.lists(BLEND_FORCES, min_size=130, max_size=130),
     depths_m=st.lists(st.floats(-0.02, -1e-9), min_size=130, max_size=130),
 )
-def test_a_blend_steps_no_further_than_its_bound_and_ends(
+def test_a_blend_steps_no_further_than_its_bound_and_ends_within_it(
     from_n: float, from_x_m: float, ticks: int, forces_n: list[float], depths_m: list[float]
 ) -> None:
-    """|dF| <= 2 limit / N + |d of the new force, cut at the limit| + |d of the old one with depth|, until w = 1."""
+    """|dF| <= 2 limit / N + |d of the new force, cut at its bound| + |d of the old one with depth|.
+
+    The bound is the limit until w = 1, and w times the limit from then on.
+    """
     state = SimpleNamespace()
     start_blend(state, from_n, from_x_m, 12.0, ticks)
 
     def old(x_m: float) -> float:
         return from_n * min(1.0, x_m / from_x_m)
 
-    def cut(force_n: float) -> float:
-        return max(-12.0, min(12.0, force_n))
+    def cut(force_n: float, at: int) -> float:
+        reach_n = 12.0 * max(1.0, at / ticks)
+        return max(-reach_n, min(reach_n, force_n))
 
     last_n = from_n
     last_x_m, last_new_n = from_x_m, forces_n[0]
@@ -299,13 +303,10 @@ def test_a_blend_steps_no_further_than_its_bound_and_ends(
         if not state.blending:
             break
         force_n = blended(state, x_m, new_n, 1.0)
-        if tick <= ticks:
-            moved_n = abs(cut(new_n) - cut(last_new_n)) + abs(old(x_m) - old(last_x_m))
-            assert abs(cut(force_n) - last_n) <= 2.0 * 12.0 / ticks + moved_n + 1e-9
-            assert abs(force_n) <= 12.0 + 1e-9 or tick == ticks
-        last_n, last_x_m, last_new_n = cut(force_n), x_m, new_n
-    assert not state.blending
-    assert tick <= 2 * ticks + 1
+        moved_n = abs(cut(new_n, tick) - cut(last_new_n, tick)) + abs(old(x_m) - old(last_x_m))
+        assert abs(force_n - last_n) <= 2.0 * 12.0 / ticks + moved_n + 1e-9
+        assert state.blending == (tick < ticks or new_n != pytest.approx(cut(new_n, tick), abs=1e-9))
+        last_n, last_x_m, last_new_n = force_n, x_m, new_n
 
 
 def test_a_blend_starts_at_the_old_force_and_lets_it_out_with_the_depth() -> None:
@@ -344,14 +345,14 @@ def test_what_is_not_in_use_of_an_axis_limit_goes_at_once_however_low_it_falls()
         assert asked_n[0] == pytest.approx(0.2)
 
 
-def test_after_a_blend_its_bound_opens_over_as_many_ticks_again() -> None:
-    """A force that asks for ten times the limit: F = limit / (2 - w) from w = 1 on, and all of it at w = 2."""
+def test_after_a_blend_its_bound_opens_no_faster_than_it_came_in() -> None:
+    """A force that asks for ten times the limit: F = w limit from w = 1 on, and all of it at w = 10."""
     state = SimpleNamespace()
     start_blend(state, 4.0, -1e-3, 12.0, 10)
-    forces_n = [blended(state, -1e-3, 120.0, 1.0) for _ in range(21)]
+    forces_n = [blended(state, -1e-3, 120.0, 1.0) for _ in range(101)]
     assert forces_n[5] == pytest.approx(0.5 * 4.0 + 0.5 * 12.0)
-    assert forces_n[10:20] == pytest.approx([12.0 / (1.0 - 0.1 * done) for done in range(10)])
-    assert forces_n[20] == 120.0
+    assert forces_n[10:] == pytest.approx([1.2 * done for done in range(10, 101)])
+    assert forces_n[100] == 120.0
     assert not state.blending
 
 

@@ -270,13 +270,13 @@ class SpaceTick(ControlTick):
         super()._stand()
         x, y, z = self.motion.position_m
         self.at_m = (x, y, z)
-        for contact in self.solids:
+        for contact in (*self.solids, *self.fading):
             contact.start(x, y, z)
         self._take_solids()
 
-    def _see_again(self) -> None:
-        super()._see_again()
-        for contact in self.solids:
+    def _blend_all(self) -> None:
+        super()._blend_all()
+        for contact in (*self.solids, *self.fading):
             for channel in contact.channels:
                 self._blend(channel)
 
@@ -312,12 +312,11 @@ class SpaceTick(ControlTick):
             laws = self._start_laws([(channel, self._fallback_law()) for channel in switch.fresh])
         for channel, law in laws:
             self._take_law(channel, law)
-        blending = [contact for contact, _, _ in switch.changed]
-        if self.guard.limited:  # who goes on would take a larger share of the limit at once
-            blending = [*self.solids, *self.fading]
-        for contact in blending:
+        for contact, _, _ in switch.changed:
             for channel in contact.channels:
                 self._blend(channel)
+        if self.guard.limited:  # who goes on would take a larger share of the limit at once
+            self._blend_all()
 
     def _join(self, limits: Limits) -> None:
         """Have clients move the objects that are theirs, within the limits that the scene sets them."""
