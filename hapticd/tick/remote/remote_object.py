@@ -11,7 +11,7 @@ from hapticd.shapes.pose import Pose, Vector
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.remote.follower import Follower
-from hapticd.tick.remote.port import Port
+from hapticd.tick.remote.port import Port, PortState
 from hapticd.tick.remote.turning import Turning, unit
 from hapticd.tick.remote.update import DAMPING, ORIENTATION, POSITION, STIFFNESS, TURNING, VELOCITY, Update
 from hapticd.tick.space.channel import Channel, stretched_m
@@ -35,7 +35,7 @@ class RemoteObject(Port):
         turning: of its orientation.
     """
 
-    __slots__ = ("_damping", "_stiffness", "contact", "follower", "turning")
+    __slots__ = ("_damping", "_said_damping", "_said_stiffness", "_stiffness", "contact", "follower", "turning")
 
     contact: RemoteContact
 
@@ -76,9 +76,14 @@ class RemoteObject(Port):
         self.follower.hold_s = self.turning.follower.hold_s = limits.hold_s
 
     def take_surface(self, solid: Solid) -> None:
-        """Have the surface that a file says until the client says otherwise."""
-        self._stiffness = solid.stiffness_n_per_m
-        self._damping = solid.damping_n_s_per_m
+        """Go over to the surface that a file says, as far as no client in force has said less."""
+        if self.state is not PortState.HELD:
+            self._said_stiffness = self._said_damping = inf
+        self._aim_below(solid)
+
+    def begin_surface(self, solid: Solid) -> None:
+        """Have a solid begin with the surface that it goes over to."""
+        solid.stiffness_n_per_m, solid.damping_n_s_per_m = self._stiffness, self._damping
 
     def stand(self) -> None:
         """Stay where it is, without a client; an event tells of one that was in force."""
@@ -110,13 +115,9 @@ class RemoteObject(Port):
 
     def _hear(self, update: Update) -> bool:
         said = update.said
-        first = self.contact.solid.configs[0]
-        self._stiffness = first.stiffness_n_per_m
-        self._damping = first.damping_n_s_per_m
-        if said & STIFFNESS:
-            self._stiffness = min(max(update.stiffness_n_per_m, 0.0), self._stiffness)
-        if said & DAMPING:
-            self._damping = min(max(update.damping_n_s_per_m, 0.0), max(0.0, self._damping))
+        self._said_stiffness = max(update.stiffness_n_per_m, 0.0) if said & STIFFNESS else inf
+        self._said_damping = max(update.damping_n_s_per_m, 0.0) if said & DAMPING else inf
+        self._aim_below(self.contact.solid)
         if said & (POSITION | VELOCITY):
             at_m = update.position_m if said & POSITION else self.follower.at_m
             self.follower.aim(at_m, update.velocity_m_per_s if said & VELOCITY else None)
@@ -126,6 +127,14 @@ class RemoteObject(Port):
                 update.angular_velocity_rad_per_s if said & TURNING else None,
             )
         return bool(said & (POSITION | VELOCITY | ORIENTATION | TURNING | STIFFNESS | DAMPING))
+
+    def _aim_below(self, solid: Solid) -> None:
+        """Have the surface go to what the client has said, within what the file says."""
+        first = solid.configs[0]
+        self._stiffness = min(self._said_stiffness, first.stiffness_n_per_m)
+        self._damping = first.damping_n_s_per_m
+        if self._said_damping < inf:
+            self._damping = min(self._said_damping, max(0.0, self._damping))
 
 
 class RemoteContact(SolidContact):
@@ -187,9 +196,10 @@ class RemoteContact(SolidContact):
         """Go on with another solid in the place of this one, and without force: its shade keeps that."""
         port = self.port
         was = Pose.of(port.follower.at_m, port.turning.now)
+        port.take_surface(solid)
+        port.begin_surface(solid)
         super().change(solid, along, limit_n, gain, at)
         self._before_n_per_m = solid.stiffness_n_per_m
-        port.take_surface(solid)
         if solid.proxy.pose != was:
             port.turning.now = unit(solid.configs[0].orientation) or port.turning.now
             port.stop(solid.placed[0].pose.position_m)
