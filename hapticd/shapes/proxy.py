@@ -25,6 +25,7 @@ _LANDINGS = 3
 _WAY_OUT = 100
 _CONE = 1.02
 _SAME_SIDE = 0.9  # cosine of 26 degrees
+_OFF_M = (1e-4, 1e-3, 1e-2)  # before a surface that was, one that is to be may begin so far
 
 
 def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> bool:
@@ -246,6 +247,36 @@ def place(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) ->
         proxy.sx = proxy.gx
         proxy.sy = proxy.gy
         proxy.sz = proxy.gz
+
+
+def place_before(proxy: Any, others: Any, voxels: Any, held: Any, x: float, y: float, z: float) -> bool:
+    """Begin before the surface on which another solid has held the device, as one that has yet to come in from there.
+
+    Args:
+        proxy: of the solid that is to be.
+        others: its other shapes.
+        voxels: the distances of its fields.
+        held: the proxy of the solid that was.
+        x: the device in the world, with y and z [m].
+        y: see x.
+        z: see x.
+
+    Returns:
+        whether that is outside: else the solid that is to be is there, and its nearest surface has been found.
+    """
+    for off_m in _OFF_M:
+        reach_m = held.depth_m + off_m
+        place(
+            proxy,
+            others,
+            voxels,
+            x + reach_m * held.normal_x,
+            y + reach_m * held.normal_y,
+            z + reach_m * held.normal_z,
+        )
+        if not proxy.touching:
+            return True
+    return False
 
 
 def release(proxy: Any, x: float, y: float, z: float, d: float) -> None:

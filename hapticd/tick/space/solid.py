@@ -134,10 +134,12 @@ class Solid:
         Of several objects the first must not have moved: seen from there, the others have.
 
         Returns:
-            Whether it was; else the proxy must be found anew.
+            Whether it was; else the proxy must be found anew, where a client moves it at the place to which it has.
         """
         moved = self.placed[0].pose != other.placed[0].pose
         if _without_place(self.configs) != _without_place(other.configs) or (moved and len(self.placed) > 1):
+            if not moved and self.remote:  # it is where its client has it
+                self.proxy.move(other.proxy.pose)
             return False
         self.proxy = copy(other.proxy)
         if moved:

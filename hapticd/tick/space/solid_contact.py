@@ -11,7 +11,7 @@ from copy import copy
 from math import inf
 
 from hapticd.shapes.pose import Vector
-from hapticd.shapes.proxy import follow, place
+from hapticd.shapes.proxy import follow, place, place_before
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
@@ -148,8 +148,9 @@ class SolidContact:
     def change(self, solid: Solid, along: list[Channel], limit_n: float, gain: float, at: Vector) -> None:
         """Go on with another solid in the place of this one, and without force: its shade keeps that.
 
-        A device that it holds stays where it was held. For one that is free nothing is known of the way since the
-        solid was last in reach, and a change is no motion: it begins anew.
+        A device that it holds stays where it was held, or with another shape on the side from which it was. For one
+        that is free nothing is known of the way since the solid was last in reach, and a change is no motion: it begins
+        anew.
 
         What the change does to the spring is the scene's own work.
 
@@ -160,7 +161,8 @@ class SolidContact:
             gain: how much of the force a release has left, 0 to 1.
             at: where the device is [m].
         """
-        stays = solid.inherit(self.solid) and solid.proxy.touching
+        before = self.solid
+        stays = solid.inherit(before) and solid.proxy.touching
         self.solid = solid
         if not (solid.rough or solid.creases):
             del self.channels[1:]
@@ -168,6 +170,8 @@ class SolidContact:
         for channel in self.channels:
             channel.rest()
         proxy = solid.proxy
+        if not stays and before.proxy.touching:
+            stays = place_before(proxy, proxy.others, proxy.voxels, before.proxy, *at)
         (follow if stays else place)(proxy, proxy.others, proxy.voxels, *at)
         self._stand()
         self._restore(limit_n, gain)
@@ -201,9 +205,10 @@ class SolidContact:
             if reach + proxy.reach_w * (x * x + y * y + z * z) > proxy.reach_limit:
                 self._away = True
                 return False
-            if self._away:
+            if self._away:  # its way in is from where it was: a late tick's may end behind the middle
                 self._away = False
-                place(proxy, proxy.others, proxy.voxels, x, y, z)
+                wx, wy, wz = way
+                place(proxy, proxy.others, proxy.voxels, x - wx, y - wy, z - wz)
         follow(proxy, proxy.others, proxy.voxels, x, y, z)
         if not proxy.touching:
             return not self.quiet and self._lose(velocity, way, dt_s)

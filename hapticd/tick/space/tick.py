@@ -206,7 +206,7 @@ class SpaceTick(ControlTick):
             way = (x - before_x, y - before_y, z - before_z)
             vx, vy, vz = velocity_m_per_s
             if self.nearby.moved_out(x, y, z):
-                self._look_around()
+                self._look_around((before_x, before_y, before_z))
             self.held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
             law_clock = self.law_clock
             if law_clock is not None:
@@ -336,10 +336,14 @@ class SpaceTick(ControlTick):
         self.has_ports = self.has_ports or bool(self.ports)
         self.has_objects = self.has_objects or bool(self.solids)  # and their books once they are gone
         self.advance = self.step_in_space if self.has_objects else self.step
-        self._look_around()
+        self._look_around(self.at_m)
 
-    def _look_around(self) -> None:
-        """Find out which solids are in reach; one that comes into reach is begun with."""
+    def _look_around(self, since: Vector) -> None:
+        """Find out which solids are in reach; one that comes into reach is begun with.
+
+        Args:
+            since: where the device was when it was out of their reach [m].
+        """
         near = set(self.nearby.look(*self.at_m))
         before = set(map(id, self.awake))
         self.awake = list(self.fading)
@@ -348,7 +352,7 @@ class SpaceTick(ControlTick):
         for at, contact in enumerate(self.solids):
             if at in near or not contact.quiet:
                 if id(contact) not in before and contact.quiet:
-                    contact.start(*self.at_m)
+                    contact.start(*since)
                 self.awake.append(contact)
             else:
                 resting.append(contact)
