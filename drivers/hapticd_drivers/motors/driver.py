@@ -266,7 +266,7 @@ class MotorDriver(Driver[MotorOptionsT]):
     def _calibrate_axis(self, mover: MotorMover, index: int) -> None:
         drum = self._drums[index]
         options = drum.options
-        force_n = min(self.options.calibration_force_n, drum.max_force_n)
+        force_n = min(self.options.calibration_force_n, drum.max_force_n, self.info.max_force_n)
         speed_m_per_s = self.options.calibration_speed_m_per_s
         drive = motion.Drive(
             mover=mover,

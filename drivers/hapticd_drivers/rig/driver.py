@@ -79,6 +79,7 @@ class RigDriver(Driver[RigOptionsT]):
         self._until_counts = 0
         self._button_bits = 0
         self._homed = False
+        self._home_in_doubt = False  # it was told to the rig, and not that it has taken it
         self._sign = Sign(self.NAME, options.sign_checked)
         self._lock = threading.Lock()  # a calibration talks to the rig beside the loop
         self._knows_home = False
@@ -185,15 +186,20 @@ class RigDriver(Driver[RigOptionsT]):
             )
         self._sign.demand()
         with self._lock:
-            self._let_forces_through(urgent=True)
+            state = self._let_forces_through(urgent=True)
+            if not state.flags & HOMED:
+                self._opened().disable(urgent=True)
+                self._homed = False
+                raise DriverStateError(f"{self.NAME}: the rig has just lost its home: `hapticd calibrate`")
 
-    def _let_forces_through(self, urgent: bool) -> None:
+    def _let_forces_through(self, urgent: bool) -> State:
         talk = self._opened()
         talk.disable(urgent)  # clears a fault whose cause is gone
         state = talk.enable(urgent)
         if not state.flags & ENABLED:
             raise self._stopped(state)
         self._silent = 0
+        return state
 
     def _read(self) -> Sample:
         if not self._lock.acquire(False):
@@ -255,7 +261,8 @@ class RigDriver(Driver[RigOptionsT]):
         self._time_us = state.time_us
         self._sequence = state.sequence
         sample.buttons = state.buttons & self._button_bits
-        self._homed = bool(state.flags & HOMED)  # a rig that has lost counts forgets its home
+        # A rig that has lost counts forgets its home.
+        self._homed = bool(state.flags & HOMED) and not self._home_in_doubt
         sample.calibrated = self._homed and self._sign.checked
         position_m = sample.position_m
         for index, axis in enumerate(self._maps):
@@ -296,17 +303,23 @@ class RigDriver(Driver[RigOptionsT]):
                 talk.disable(urgent=False)
             for index, home in enumerate(homes):
                 if home is not None:
+                    self._home_in_doubt = True
                     talk.set_home(index, home)
                     self._maps[index].put_home(home)
+            state = talk.state()
+            if state.fault:  # of its sensor, perhaps: what it has counted since is not known
+                self._home_in_doubt = True
+                raise self._stopped(state)
+            self._home_in_doubt = False
             self._sign.checked = True
-            self._accept(talk.state())
+            self._accept(state)
             talk.poll(self._answer_after_us)
 
     def _calibrated(self, mover: RigMover, index: int) -> int | None:
         """Check one axis and find its home; None when the rig knows that itself."""
         axis = self._maps[index]
         options = self.options
-        force_n = min(options.calibration_force_n, axis.max_force_n)
+        force_n = min(options.calibration_force_n, axis.max_force_n, self.info.max_force_n)
         speed_m_per_s = options.calibration_speed_m_per_s
         drive = motion.Drive(
             mover=mover,

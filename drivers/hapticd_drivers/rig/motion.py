@@ -33,7 +33,7 @@ STALL_S = 0.3
 BACK_OFF_M = 5e-3
 AGREE_M = 0.3e-3
 AGREE_COUNTS = 4
-"""An end is found twice, from so far away, and has to be at the same place within this [m]."""
+"""An end or a switch is found twice, from so far away, and has to be at the same place within this [m]."""
 
 FAST = 8.0
 """A drive ends when the handle moves so many times as fast as it should."""
@@ -139,24 +139,46 @@ def find_stop(drive: Drive, towards: float) -> int:
             "not move it from there"
         )
     end = _end(drive, towards)
-    if abs(end.position_m - first.position_m) > max(AGREE_M, AGREE_COUNTS * drive.count_m):
+    if not _agree(drive, first, end):
         raise DeviceFaultError(
-            f"axis {drive.name}: its end was found at two places {1e3 * abs(end.position_m - first.position_m):.2f} mm "
-            "apart: something is in the way, or device.options.calibration_force_n is too small for its friction"
+            f"axis {drive.name}: its end was found at two places {_apart_mm(first, end):.2f} mm apart: something is in "
+            "the way, or device.options.calibration_force_n is too small for its friction"
         )
     return end.counts
 
 
 def find_switch(drive: Drive, towards: float) -> int:
-    """Drive gently until the home switch closes; the count where it does.
+    """Drive gently until the home switch closes, twice; the count where it does.
 
     Args:
         drive: how.
         towards: -1 downwards, 1 upwards.
 
     Raises:
-        DeviceFaultError: it does not open or close, or the handle moves too fast.
+        DeviceFaultError: it does not open or close, or not at one place, or the handle moves too fast.
     """
+    first = _close(drive, towards)
+    _go(drive, -towards, BACK_OFF_M)
+    again = _close(drive, towards)
+    if not _agree(drive, first, again):
+        raise DeviceFaultError(
+            f"axis {drive.name}: the home switch closed at two places {_apart_mm(first, again):.2f} mm apart: is there "
+            "noise on its line, or play in it?"
+        )
+    return again.counts
+
+
+def here(drive: Drive) -> int:
+    """The count where the handle rests.
+
+    Raises:
+        DeviceFaultError: it does not come to rest.
+    """
+    return _settled(drive).counts
+
+
+def _close(drive: Drive, towards: float) -> Moment:
+    """Drive until the home switch closes, from where it is open; where it did."""
     if drive.push(0.0).switch and _go(drive, -towards, math.inf, while_switch=True).switch:
         drive.push(0.0)
         raise DeviceFaultError(
@@ -167,16 +189,16 @@ def find_switch(drive: Drive, towards: float) -> int:
     _settled(drive)
     if not closed.switch:
         raise DeviceFaultError(f"axis {drive.name}: the home switch does not close on the way to the end of the travel")
-    return closed.counts
+    return closed
 
 
-def here(drive: Drive) -> int:
-    """The count where the handle rests.
+def _agree(drive: Drive, first: Moment, again: Moment) -> bool:
+    """Whether two moments are at one place."""
+    return abs(again.position_m - first.position_m) <= max(AGREE_M, AGREE_COUNTS * drive.count_m)
 
-    Raises:
-        DeviceFaultError: it does not come to rest.
-    """
-    return _settled(drive).counts
+
+def _apart_mm(first: Moment, again: Moment) -> float:
+    return 1e3 * abs(again.position_m - first.position_m)
 
 
 def _end(drive: Drive, towards: float) -> Moment:

@@ -10,10 +10,14 @@ import pytest
 from hapticd.driver import DriverState
 from hapticd.errors import (
     DeviceFaultError,
+    DeviceTimeoutError,
     DriverError,
     DriverStateError,
 )
-from tests.drivers.rig.device import HALF_TRAVEL_M, Rig
+from hapticd_drivers.rig import conversation
+from hapticd_drivers.rig.conversation import Conversation
+from hapticd_drivers.rig.serial_rig import SerialRig
+from tests.drivers.rig.device import HALF_TRAVEL_M, PATIENCE_S, Rig
 from tests.drivers.rig.ticking import PERIOD_S, MakeDriver, settle, tick
 
 
@@ -148,3 +152,80 @@ def test_positions_go_on_while_it_is_calibrated(make_driver: MakeDriver) -> None
         seen.add(driver.read().position_m[0])
         time.sleep(PERIOD_S)
     assert len(seen) > 20
+
+
+def lost_answers(rig: Rig, driver: SerialRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calibrate, with the rig hearing where its home is and its answers lost."""
+    monkeypatch.setattr(conversation, "PATIENCE_S", 1.0)
+    rig.up = lambda said: b"" if b"\x82" in said[:4] else said  # AXIS
+    with pytest.raises(DeviceTimeoutError):
+        driver.calibrate()
+    rig.up = bytes
+    monkeypatch.setattr(conversation, "PATIENCE_S", PATIENCE_S)
+
+
+def test_a_home_that_the_rig_may_have_taken_and_the_driver_has_not_is_none(
+    rig: Rig, make_driver: MakeDriver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was believed to be in the middle of the travel, 40 mm away, and force was let through."""
+    rig.plant.position_m = 0.04
+    rig.restart()
+    axis = {"homing": "here", "home_m": 0.04, "lowest_m": -0.05, "highest_m": 0.05}
+    driver = make_driver(axes=[axis], sign_checked=True)
+    driver.open()
+    lost_answers(rig, driver, monkeypatch)
+    settle(rig, driver)
+    assert not driver.read().calibrated
+    with pytest.raises(DriverStateError, match="hapticd calibrate"):
+        driver.enable()
+    driver.calibrate()
+    assert settle(rig, driver) == pytest.approx(0.04, abs=2e-3)
+    driver.enable()
+
+
+def test_a_slip_before_the_rig_is_told_its_home_fails_the_calibration(
+    rig: Rig, make_driver: MakeDriver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver = make_driver(axes=[{"homing": "here"}], sign_checked=True)
+    driver.open()
+    set_home = Conversation.set_home
+
+    def late(talk: Conversation, axis: int, home: int) -> None:
+        rig.break_down(1, 0, 0)
+        rig.mend()
+        set_home(talk, axis, home)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Conversation, "set_home", late)
+        with pytest.raises(DeviceFaultError):
+            driver.calibrate()
+    settle(rig, driver)
+    with pytest.raises(DriverStateError, match="hapticd calibrate"):
+        driver.enable()
+    assert rig.force_n == 0.0
+    driver.calibrate()
+    driver.enable()
+
+
+def test_a_home_that_is_lost_since_the_last_tick_is_seen_before_forces_pass(rig: Rig, make_driver: MakeDriver) -> None:
+    rig.set_home()
+    driver = make_driver(sign_checked=True)
+    driver.open()
+    assert driver.read().calibrated
+    rig.break_down(1, 0, 0)
+    rig.mend()
+    with pytest.raises(DriverStateError, match="lost its home"):
+        driver.enable()
+    assert rig.force_n == 0.0
+    with pytest.raises(DriverStateError, match="hapticd calibrate"):
+        driver.enable()
+
+
+def test_a_calibration_pushes_no_harder_than_the_device_may(rig: Rig, make_driver: MakeDriver) -> None:
+    rig.plant.friction_n = 0.3
+    witness = Witness(rig)
+    driver = make_driver(axes=[{"homing": "here"}], max_force_n=0.2, calibration_force_n=0.5)
+    driver.open()
+    with pytest.raises(DeviceFaultError, match="more than the friction"):
+        driver.calibrate()
+    assert witness.most_n == pytest.approx(0.2)
