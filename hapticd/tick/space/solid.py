@@ -125,8 +125,8 @@ class Solid:
         return carrier, inside
 
     def same_as(self, other: Solid) -> bool:
-        """Whether the tables of the two say the same."""
-        return self.configs == other.configs
+        """Whether the tables of the two say the same, and their files hold the same."""
+        return self.configs == other.configs and self._same_fields(other)
 
     def inherit(self, other: Solid) -> bool:
         """Take the proxy over from a solid of the same name, where this one has moved but is the same shape.
@@ -137,7 +137,8 @@ class Solid:
             Whether it was; else the proxy must be found anew, where a client moves it at the place to which it has.
         """
         moved = self.placed[0].pose != other.placed[0].pose
-        if _without_place(self.configs) != _without_place(other.configs) or (moved and len(self.placed) > 1):
+        same_shape = _without_place(self.configs) == _without_place(other.configs) and self._same_fields(other)
+        if not same_shape or (moved and len(self.placed) > 1):
             if not moved and self.remote:  # it is where its client has it
                 self.proxy.move(other.proxy.pose)
             return False
@@ -145,6 +146,10 @@ class Solid:
         if moved:
             self.proxy.move(self.placed[0].pose)
         return True
+
+    def _same_fields(self, other: Solid) -> bool:
+        """Whether meshes are as they were read before; where the tables are alike."""
+        return all(mine.field is its.field for mine, its in zip(self.placed, other.placed, strict=True))
 
     def let_go(self) -> None:
         """Be gone: without force from now on."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 
-from tests.tick.space.rig import INFO, Rig, table
+from tests.tick.space.rig import INFO, Rig, ball_field, table
 
 REAL = dataclasses.replace(INFO, simulated=False, workspace_m=((-0.2, 0.2),) * 3)
 CUBE = table("cube", "box", 5000.0, size_m=(0.01, 0.01, 0.01))
@@ -60,3 +61,17 @@ def test_a_reload_under_a_device_that_is_deep_in_a_new_shape_still_finds_a_surfa
     rig = Rig(plate(), "none").start((0.0, 0.0, 0.01)).to((0.0, 0.0, -0.001), 200)
     rig.switch(plate(size_m=(0.06, 0.06, 0.05))).to((0.0, 0.0, -0.001), 200)
     assert rig.force[2] == pytest.approx(-12.0)
+
+
+@pytest.mark.parametrize("stiffness_n_per_m", [5000.0, 6000.0], ids=["nothing else", "stiffness as well"])
+def test_a_mesh_that_was_made_anew_under_its_name_is_taken_over(tmp_path: Path, stiffness_n_per_m: float) -> None:
+    """The hand went on feeling a shape that no file had."""
+    file = tmp_path / "it.field"
+    file.write_bytes(ball_field(0.03, 0.002).pack())
+    rig = Rig(table("it", "mesh", 5000.0, file=str(file)), "none").start((0.0, 0.0, 0.05)).to((0.0, 0.0, 0.029), 100)
+    assert rig.force[2] == pytest.approx(5.0, rel=0.05)
+    file.write_bytes(ball_field(0.02, 0.002).pack())
+    rig.switch(table("it", "mesh", stiffness_n_per_m, file=str(file))).to((0.0, 0.0, 0.029), 100)
+    assert rig.force == (0.0, 0.0, 0.0)
+    rig.to((0.0, 0.0, 0.019), 100)
+    assert rig.force[2] == pytest.approx(1e-3 * stiffness_n_per_m, rel=0.05)
