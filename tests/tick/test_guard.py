@@ -169,6 +169,14 @@ def test_a_release_that_takes_no_longer_than_a_tick_is_over_at_once(ramp_s: floa
     assert written(made, 10.0, 1) == [0.0]
 
 
+def test_a_force_that_has_been_let_out_leaves_no_gain() -> None:
+    made = armed()
+    made.drop()
+    assert (made.mode, made.gain) == (Mode.DISARMED, 0.0)
+    assert made.arm()
+    assert made.gain == 1.0
+
+
 def test_a_fault_latches_until_it_is_cleared_explicitly() -> None:
     made = armed()
     made.release(0.005, latch=True)
