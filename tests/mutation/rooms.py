@@ -90,8 +90,8 @@ ROOMS = {
         tuple(
             f"hapticd/tick/remote/{name}.py"
             for name in (
-                "books", "coupling", "follower", "line", "one_port", "port", "port_state", "ports", "ramped",
-                "port_site", "remote_object", "streamed_force", "tick_ports", "turning", "update",
+                "asked_spring", "books", "coupling", "follower", "line", "one_port", "port", "port_state", "ports",
+                "ramped", "port_site", "remote_object", "streamed_force", "tick_ports", "turning", "update",
             )
         ),
         ("tests/tick/remote", RUNS),

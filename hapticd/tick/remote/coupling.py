@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import sqrt
 
 from hapticd.config.remote import PortLimits
+from hapticd.tick.remote.asked_spring import AskedSpring
 from hapticd.tick.remote.follower import Follower
 from hapticd.tick.remote.one_port import OnePort, PortAxis
 from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.port_state import PortState
 from hapticd.tick.remote.ramped import Ramped
-from hapticd.tick.remote.update import DAMPING, POSITION, STIFFNESS, VELOCITY, Update
+from hapticd.tick.remote.update import POSITION, VELOCITY, Update
 from hapticd.tick.space.channel import LEAST_M
 
 
@@ -33,24 +34,14 @@ class Coupling(OnePort):
         damping: of its damper, without the law's [N s/m].
     """
 
-    __slots__ = (
-        "_gone_m",
-        "_left_s",
-        "_said_damping",
-        "_said_stiffness",
-        "_speed_m_per_s",
-        "_stretch_m",
-        "_unsaid_s",
-        "damping",
-        "follower",
-    )
+    __slots__ = ("_asked", "_gone_m", "_left_s", "_speed_m_per_s", "_stretch_m", "_unsaid_s", "damping", "follower")
 
     def __init__(self, limits: PortLimits, site: PortSite) -> None:
         super().__init__(limits, site)
         self.follower = Follower(len(self.channels), limits.max_speed_m_per_s, limits.hold_s)
         self.target_m = self.follower.at_m
         self.damping = Ramped(limits.damping_n_s_per_m)
-        self._said_stiffness = self._said_damping = inf
+        self._asked = AskedSpring()
         self._stretch_m = self._speed_m_per_s = 0.0
         self._gone_m = [0.0] * len(self.channels)  # of the followed target, since the last sample
         self._left_s = 0.0  # until spring and damper have come in
@@ -62,22 +53,21 @@ class Coupling(OnePort):
         self.follower.max_speed_m_per_s = limits.max_speed_m_per_s
         self.follower.hold_s = limits.hold_s
         if self.state is not PortState.HELD:
-            self._said_stiffness = self._said_damping = inf
-        self._aim_below(limits)
+            self._asked.forget()
+        self._aim()
 
     def _hear(self, update: Update) -> bool:
         if not update.said & POSITION:
             return False
         self.follower.aim(update.position_m, update.velocity_m_per_s if update.said & VELOCITY else None)
-        self._said_stiffness = max(update.stiffness_n_per_m, 0.0) if update.said & STIFFNESS else inf
-        self._said_damping = max(update.damping_n_s_per_m, 0.0) if update.said & DAMPING else inf
-        self._aim_below(self.limits)
+        self._asked.hear(update)
+        self._aim()
         return True
 
-    def _aim_below(self, limits: PortLimits) -> None:
-        """Have stiffness and damping go to what the client has said, or to the limit, by a ramp."""
-        stiffness_n_per_m = min(self._said_stiffness, limits.stiffness_n_per_m)
-        damping_n_s_per_m = min(self._said_damping, limits.damping_n_s_per_m)
+    def _aim(self) -> None:
+        """Have stiffness and damping go to what the client has asked for, within the limits, by a ramp."""
+        limits = self.limits
+        stiffness_n_per_m, damping_n_s_per_m = self._asked.within(limits.stiffness_n_per_m, limits.damping_n_s_per_m)
         if stiffness_n_per_m != self.stiffness.goal:
             self.stiffness.aim(stiffness_n_per_m, self._stretch_m, self.limit_n)
         if damping_n_s_per_m != self.damping.goal:

@@ -10,6 +10,7 @@ from hapticd.config.remote import PortLimits
 from hapticd.shapes.pose import Pose, Vector
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
+from hapticd.tick.remote.asked_spring import AskedSpring
 from hapticd.tick.remote.follower import Follower
 from hapticd.tick.remote.port import Port, PortState
 from hapticd.tick.remote.turning import Turning, unit
@@ -35,7 +36,7 @@ class RemoteObject(Port):
         turning: of its orientation.
     """
 
-    __slots__ = ("_damping", "_said_damping", "_said_stiffness", "_stiffness", "contact", "follower", "turning")
+    __slots__ = ("_asked", "_damping", "_stiffness", "contact", "follower", "turning")
 
     contact: RemoteContact
 
@@ -45,6 +46,7 @@ class RemoteObject(Port):
         self.follower = Follower(3, limits.max_speed_m_per_s, limits.hold_s)
         self.turning = Turning(first.orientation, _max_turning(limits, solid), limits.hold_s)
         self.target_m = self.follower.at_m
+        self._asked = AskedSpring()
         self.take_surface(solid)
         self.stop(first.position_m)
 
@@ -76,13 +78,10 @@ class RemoteObject(Port):
         self.follower.hold_s = self.turning.follower.hold_s = limits.hold_s
 
     def take_surface(self, solid: Solid) -> None:
-        """Go over to the surface that a file says, as far as no client in force has said less."""
+        """Begin with a solid, and the surface that its file says, as far as no client in force has asked for less."""
         if self.state is not PortState.HELD:
-            self._said_stiffness = self._said_damping = inf
-        self._aim_below(solid)
-
-    def begin_surface(self, solid: Solid) -> None:
-        """Have a solid begin with the surface that it goes over to."""
+            self._asked.forget()
+        self._aim(solid)
         solid.stiffness_n_per_m, solid.damping_n_s_per_m = self._stiffness, self._damping
 
     def stand(self) -> None:
@@ -115,9 +114,8 @@ class RemoteObject(Port):
 
     def _hear(self, update: Update) -> bool:
         said = update.said
-        self._said_stiffness = max(update.stiffness_n_per_m, 0.0) if said & STIFFNESS else inf
-        self._said_damping = max(update.damping_n_s_per_m, 0.0) if said & DAMPING else inf
-        self._aim_below(self.contact.solid)
+        self._asked.hear(update)
+        self._aim(self.contact.solid)
         if said & (POSITION | VELOCITY):
             at_m = update.position_m if said & POSITION else self.follower.at_m
             self.follower.aim(at_m, update.velocity_m_per_s if said & VELOCITY else None)
@@ -128,13 +126,10 @@ class RemoteObject(Port):
             )
         return bool(said & (POSITION | VELOCITY | ORIENTATION | TURNING | STIFFNESS | DAMPING))
 
-    def _aim_below(self, solid: Solid) -> None:
-        """Have the surface go to what the client has said, within what the file says."""
+    def _aim(self, solid: Solid) -> None:
+        """Have the surface go to what the client has asked for, within what the file says."""
         first = solid.configs[0]
-        self._stiffness = min(self._said_stiffness, first.stiffness_n_per_m)
-        self._damping = first.damping_n_s_per_m
-        if self._said_damping < inf:
-            self._damping = min(self._said_damping, max(0.0, self._damping))
+        self._stiffness, self._damping = self._asked.within(first.stiffness_n_per_m, first.damping_n_s_per_m)
 
 
 class RemoteContact(SolidContact):
@@ -197,7 +192,6 @@ class RemoteContact(SolidContact):
         port = self.port
         was = Pose.of(port.follower.at_m, port.turning.now)
         port.take_surface(solid)
-        port.begin_surface(solid)
         super().change(solid, along, limit_n, gain, at)
         self._before_n_per_m = solid.stiffness_n_per_m
         if solid.proxy.pose != was:

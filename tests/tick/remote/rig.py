@@ -89,7 +89,7 @@ def update(seq: int = 0, released: bool = False, **said: Any) -> Update:
 
 
 class Metered:
-    """A law that adds nothing to a contact's own force, and counts the work of what it is told was applied.
+    """A law that leaves a contact its own force, and adds up the work of the force that was applied.
 
     Args:
         contact: gets it.
