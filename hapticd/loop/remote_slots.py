@@ -7,8 +7,8 @@ A slot a port:
 The word `REMOTE` counts the updates written, so that a tick in which there was none compares one number. `list_of`
 numbers the list of ports that an update is for, the same on either side: after a reload an update for the list before
 is not taken for another name. Which of the two sides goes over to another list first is not known: until the other one
-has, an update for the list before is for the port that goes on under its name, and what is written by then for any
-other list is nobody's.
+has, an update for the list before is for the port that goes on under its name. An update for any other list is passed
+over.
 """
 
 from __future__ import annotations

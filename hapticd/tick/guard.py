@@ -56,11 +56,11 @@ def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: in
 
 
 def begin_late(state: Any, periods: float) -> None:
-    """Have a transition that no tick has seen yet begin so many periods after the last one, and not right with it.
+    """Delay a transition whose first tick is still to come.
 
     Args:
         state: the fields of `BlendFields`.
-        periods: in periods of the loop; endless: with the tick that sees it first, however late that is.
+        periods: from the last tick on, in periods of the loop; inf: it begins with its first tick, however late.
     """
     if state.blending and state.blend_tick < 0.0:
         state.blend_tick = -1.0 - periods

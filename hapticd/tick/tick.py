@@ -387,7 +387,6 @@ class ControlTick:
         self.sight.blind = False
         self._stand()
         self._blend_all()
-        self._begin_late(math.inf)
 
     def _replace_laws(self, contact: Contact, error: BaseException, periods: float) -> None:
         """The law of a contact raised or returned nonsense: all are replaced, and asked again."""
@@ -499,6 +498,6 @@ class ControlTick:
             self._blend(contact)
 
     def _begin_late(self, periods: float) -> None:
-        """Have the ramps that no tick has seen begin so many periods after the last one; inf: with the next."""
+        """Delay ramps whose first tick is still to come by so many periods; inf: begin with that tick, however late."""
         for contact in (*self._under_law(), *self._fading_out(), *self.own_ports.axes):
             begin_late(contact, periods)

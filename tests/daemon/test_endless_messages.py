@@ -131,7 +131,7 @@ def heard_as(daemon: Daemon) -> set[int]:
     """Scheduling classes of the process that hears clients; none while one that stood still is started again."""
     try:
         return classes(remote_pid(daemon))
-    except OSError:  # it ended meanwhile
+    except OSError:  # the process has ended
         return set()
 
 

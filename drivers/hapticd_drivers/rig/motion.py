@@ -139,11 +139,13 @@ def find_stop(drive: Drive, towards: float) -> int:
             "not move it from there"
         )
     end = _end(drive, towards)
-    if not _agree(drive, first, end):
-        raise DeviceFaultError(
-            f"axis {drive.name}: its end was found at two places {_apart_mm(first, end):.2f} mm apart: something is in "
-            "the way, or device.options.calibration_force_n is too small for its friction"
-        )
+    _demand_one_place(
+        drive,
+        first,
+        end,
+        "its end was found",
+        "something is in the way, or device.options.calibration_force_n is too small for its friction",
+    )
     return end.counts
 
 
@@ -160,11 +162,7 @@ def find_switch(drive: Drive, towards: float) -> int:
     first = _close(drive, towards)
     _go(drive, -towards, BACK_OFF_M)
     again = _close(drive, towards)
-    if not _agree(drive, first, again):
-        raise DeviceFaultError(
-            f"axis {drive.name}: the home switch closed at two places {_apart_mm(first, again):.2f} mm apart: is there "
-            "noise on its line, or play in it?"
-        )
+    _demand_one_place(drive, first, again, "the home switch closed", "is there noise on its line, or play in it?")
     return again.counts
 
 
@@ -192,13 +190,11 @@ def _close(drive: Drive, towards: float) -> Moment:
     return closed
 
 
-def _agree(drive: Drive, first: Moment, again: Moment) -> bool:
-    """Whether two moments are at one place."""
-    return abs(again.position_m - first.position_m) <= max(AGREE_M, AGREE_COUNTS * drive.count_m)
-
-
-def _apart_mm(first: Moment, again: Moment) -> float:
-    return 1e3 * abs(again.position_m - first.position_m)
+def _demand_one_place(drive: Drive, first: Moment, again: Moment, what: str, why: str) -> None:
+    """Refuse what was found twice, and at two places."""
+    apart_m = abs(again.position_m - first.position_m)
+    if apart_m > max(AGREE_M, AGREE_COUNTS * drive.count_m):
+        raise DeviceFaultError(f"axis {drive.name}: {what} at two places {1e3 * apart_m:.2f} mm apart: {why}")
 
 
 def _end(drive: Drive, towards: float) -> Moment:
