@@ -1,6 +1,6 @@
 /* The core under libFuzzer. An input is a script of what a host, a line, a clock and a breaking device may do. A second,
  * plain model of docs/rig-protocol.md lives through the same; after every step the motor must be told what the model
- * says, and everything that the device sends must be well formed. */
+ * says, everything that the device sends must be well formed, and it must tell each fault and every lost home. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,13 +8,19 @@
 #include "fields.h"
 #include "host_rig.h"
 
-enum { SILENCE_US = 20000, MAX_FORCE_UN = 5000000 };
+enum { SILENCE_US = 20000, MAX_FORCE_UN = 5000000, SENSOR = 1, MOST_TOLD = 8 };
 
 static struct host_rig *host;
 
 static struct {
     uint32_t now_us, fed_us;
-    bool greeted, enabled, faulted, broken;
+    bool greeted, enabled, homed;
+    uint8_t fault;
+    uint8_t present; /* what is broken */
+    bool slipped; /* which the board remembers */
+    bool slips_when_driven;
+    uint8_t to_tell[MOST_TOLD]; /* faults, since the last look */
+    unsigned told;
     uint16_t last;
     int32_t force_un;
     uint8_t frame[65];
@@ -35,18 +41,39 @@ static bool crc_is_right(const uint8_t *message, unsigned length)
     return (message[length - 2] | message[length - 1] << 8) == defined_crc(message, length - 2);
 }
 
+static void model_drive(int32_t force_un)
+{
+    model.force_un = force_un;
+    model.slipped = model.slipped || model.slips_when_driven;
+    model.slips_when_driven = false;
+}
+
 static void model_off(void)
 {
     model.enabled = false;
-    model.force_un = 0;
+    model_drive(0);
+}
+
+static uint8_t model_problem(void)
+{
+    return model.slipped ? SENSOR : model.present;
+}
+
+static void model_look(void)
+{
+    uint8_t problem = model_problem();
+    if (problem != 0 && (model.fault == 0 || (problem == SENSOR && model.fault != SENSOR))) {
+        model_off();
+        model.fault = problem;
+        model.homed = model.homed && problem != SENSOR;
+        require(model.told < MOST_TOLD, "more faults at a time than there can be");
+        model.to_tell[model.told++] = problem;
+    }
 }
 
 static void model_work(void)
 {
-    if (model.broken && !model.faulted) {
-        model.faulted = true;
-        model_off();
-    }
+    model_look();
     if (model.enabled && model.now_us - model.fed_us > SILENCE_US) {
         model_off();
     }
@@ -66,26 +93,33 @@ static void model_receive(const uint8_t *message, unsigned length)
     }
     model.last = sequence;
     switch (message[1]) {
+    case 3:
+        model.homed = model.homed || (message[4] == 0 && model.fault != SENSOR);
+        break;
     case 1:
         model.greeted = true;
         model_off();
         break;
     case 4:
-        if (!model.enabled && !model.faulted) {
+        if (!model.enabled && model.fault == 0) {
             model.enabled = true;
             model.fed_us = model.now_us;
         }
         break;
     case 5:
         model_off();
-        model.faulted = model.broken;
+        model.slipped = model.slipped && model.fault != SENSOR;
+        if (model_problem() != model.fault) {
+            model.fault = 0;
+        }
+        model_look();
         break;
     case 7:
         if (model.enabled) {
             int32_t force_un = (int32_t)(message[6] | message[7] << 8 | message[8] << 16 | (uint32_t)message[9] << 24);
             force_un = force_un > MAX_FORCE_UN ? MAX_FORCE_UN : force_un;
-            model.force_un = force_un < -MAX_FORCE_UN ? -MAX_FORCE_UN : force_un;
             model.fed_us = model.now_us;
+            model_drive(force_un < -MAX_FORCE_UN ? -MAX_FORCE_UN : force_un);
         }
         break;
     }
@@ -151,7 +185,8 @@ static void write_frame(const uint8_t *message, unsigned length)
 
 static void look(void)
 {
-    uint8_t message[64];
+    uint8_t message[64] = {0};
+    unsigned told = 0;
     for (uint8_t length; (length = host_rig_read_message(host, message)) != 0;) {
         unsigned expected = 0;
         switch (message[1]) {
@@ -164,6 +199,17 @@ static void look(void)
         }
         require(message[0] == 1 && length == expected && crc_is_right(message, length), "a malformed message");
         require((message[2] | message[3] << 8) == model.next_from_device++, "a gap in the device's sequence");
+        if (message[1] == 0x90) {
+            require(told < model.told && message[10] == model.to_tell[told], "a fault is told that the model has not");
+            told++;
+        }
+    }
+    require(told == model.told, "a fault is not told");
+    model.told = 0;
+    if (message[1] == 0x84 || message[1] == 0x81) { /* the last of all: nothing has changed since */
+        uint8_t flags = message[message[1] == 0x84 ? 10 : 13];
+        require((flags & 1) == model.enabled && (flags >> 1 & 1) == model.homed, "other flags than the model's");
+        require(message[1] == 0x81 || message[11] == model.fault, "another fault than the model's");
     }
     require(host_rig_force(host, 0) == model.force_un, "the motor is told something that the model is not");
 }
@@ -173,7 +219,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memset(&model, 0, sizeof model);
     host = host_rig_new(1);
     while (size >= 3) {
-        uint8_t operation = data[0] % 11;
+        uint8_t operation = data[0] % 12;
         size_t length = data[1] % 16;
         const uint8_t *rest = data + 2;
         length = length < size - 2 ? length : size - 2;
@@ -224,8 +270,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             break;
         }
         case 5:
-            model.broken = length > 0 && rest[0] != 0;
-            host_rig_break(host, length > 0 ? rest[0] : 0, length > 1 ? rest[1] : 0, 0);
+            model.present = length > 0 ? rest[0] % 4 : 0;
+            model.slipped = model.slipped || model.present == SENSOR;
+            host_rig_break(host, model.present, length > 1 ? rest[1] : 0, 0);
+            break;
+        case 11:
+            model.slips_when_driven = true;
+            host_rig_slip_when_driven(host);
             break;
         case 6: { /* a report of any length */
             uint8_t report[80] = {0};
@@ -241,9 +292,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             host_rig_set_position(host, 0, length > 0 ? rest[0] * 65537 : -1);
             break;
         case 8: {
-            bool broken = model.broken;
+            uint8_t present = model.present;
+            bool slips_when_driven = model.slips_when_driven;
             memset(&model, 0, sizeof model);
-            model.broken = broken;
+            model.present = present;
+            model.slips_when_driven = slips_when_driven;
+            model_off();
             host_rig_restart(host);
             break;
         }

@@ -57,9 +57,14 @@ def test_a_fuzzer_finds_none_in_ten_minutes_either(tmp_path: Path) -> None:
         ("rig.c", "ahead == 0 || ahead > 0x7fff", "ahead > 0x7fff"),
         ("rig.c", "rig->enabled || rig->fault != RIG_NO_FAULT", "rig->enabled"),
         ("rig.c", "    rig_work(rig); /* first", "    /*"),
+        ("rig.c", "rig->fault != RIG_NO_FAULT && !slipped", "rig->fault != RIG_NO_FAULT"),
+        ("rig.c", "slipped && !knows_home", "false && !knows_home"),
+        ("rig.c", "forget_problem(rig->board, rig->fault)", "forget_problem(rig->board, RIG_SENSOR_FAULT)"),
+        ("rig.c", "    look_for_problems(rig); /* one", "    /*"),
+        ("rig.c", "if (rig->fault != RIG_SENSOR_FAULT)", "if (true)"),
         ("frame.c", "receiver->collected == FRAME_ENCODED_MAX", "receiver->collected > FRAME_ENCODED_MAX"),
     ],
-    ids=["crc", "order", "twice", "fault", "late", "overlong"],
+    ids=["crc", "order", "twice", "fault", "late", "slip", "lost", "forget", "next", "home", "overlong"],
 )
 def test_the_fuzzer_finds_a_core_that_is_broken(tmp_path: Path, file: str, right: str, wrong: str) -> None:
     need("make", "clang")
@@ -71,7 +76,7 @@ def test_the_fuzzer_finds_a_core_that_is_broken(tmp_path: Path, file: str, right
     text = source.read_text()
     assert text.count(right) == 1
     source.write_text(text.replace(right, wrong))
-    with pytest.raises(AssertionError, match=r"the motor is told|AddressSanitizer|runtime error"):
+    with pytest.raises(AssertionError, match=r"the model|not told|AddressSanitizer|runtime error"):
         _runs(tmp_path / "build", tmp_path / "a" / "b" / "host-rig", seconds=120)
 
 

@@ -99,6 +99,23 @@ def test_counts_that_are_lost_are_a_fault_and_not_a_wrong_position(board: Board)
         assert not last.flags & (messages.ENABLED | messages.HOMED)
 
 
+def test_counts_that_are_lost_behind_a_restart_take_the_home_away(board: Board) -> None:
+    board.plant(mass_kg=0.01, damping_n_s_per_m=1.0)
+    with Talk(board) as host:
+        host.greet()
+        board.hang()
+        board.run(30_000)
+        host.say(messages.hello, 2000)
+        host.say(lambda sequence: messages.set_home(sequence, 0, 0))
+        before = host.poll()
+        assert (before.flags & messages.HOMED, before.fault) == (messages.HOMED, 3)
+        board.hand(20.0)  # up to 14 m/s
+        board.run(20_000)
+        board.hand(0.0)
+        host.say(messages.disable, 2000)
+        assert not host.state(messages.disable).flags & messages.HOMED
+
+
 def test_the_home_switch_is_closed_at_the_lower_end_stop_only(board: Board) -> None:
     with Talk(board) as host:
         host.greet()

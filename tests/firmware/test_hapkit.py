@@ -99,6 +99,19 @@ def test_a_sensor_that_jumps_further_than_a_hand_is_a_fault_and_not_a_position(b
         assert host.state(messages.disable).fault == 0
 
 
+def test_no_home_is_known_while_the_sensor_has_slipped(board: Board) -> None:
+    with Talk(board) as host:
+        host.greet()
+        board.turn_magnet(400)
+        board.run(2000)
+        host.say(lambda sequence: messages.set_home(sequence, 0, 0))
+        slipped = host.poll()
+        assert (slipped.flags & messages.HOMED, slipped.fault) == (0, 1)
+        assert not host.state(messages.disable).flags & messages.HOMED
+        host.say(lambda sequence: messages.set_home(sequence, 0, 0))
+        assert host.poll().flags & messages.HOMED
+
+
 def test_a_broken_wire_of_the_sensor_is_a_fault_until_it_is_mended(board: Board) -> None:
     """The pull-up at the input makes it a voltage that the sensor never shows."""
     with Talk(board) as host:

@@ -11,8 +11,8 @@ from tests.firmware.tools import FIRMWARE, HERE, need, run
 
 POWER_ON, BY_WATCHDOG = 1 << 0, 1 << 4
 """Bits of the reset cause register."""
-RESTART = 3
-"""Fault of the protocol."""
+SENSOR, RESTART = 1, 3
+"""Faults of the protocol."""
 
 
 @pytest.fixture(scope="session")
@@ -145,6 +145,48 @@ def test_a_restart_by_the_watchdog_is_a_fault_until_somebody_disables(program: P
     assert (enabled.flags & messages.ENABLED, enabled.fault) == (messages.ENABLED, 0)
     assert (still, moving) == ("motor 1 0", "motor 1 1024")
     assert causes == f"causes {BY_WATCHDOG:x}", "what is not cleared is told again after the next start"
+
+
+def test_a_slip_behind_a_restart_takes_the_home_away_and_neither_is_forgotten(program: Path) -> None:
+    said = live(
+        program,
+        report(messages.hello(1)),
+        report(messages.set_home(2, 0, 0)),
+        report(messages.poll(3, 0)),
+        "slip",
+        report(messages.disable(4)),
+        report(messages.disable(5)),
+        report(messages.enable(6)),
+        reset_cause=BY_WATCHDOG,
+    )
+    faults = [message.fault for message in said if isinstance(message, messages.Fault)]
+    states = [message for message in said if isinstance(message, messages.State)]
+    assert faults == [RESTART, SENSOR, RESTART]
+    assert [(state.flags, state.fault) for state in states] == [
+        (messages.HOMED, RESTART),
+        (0, RESTART),
+        (0, 0),
+        (messages.ENABLED, 0),
+    ]
+
+
+def test_no_home_is_known_while_a_slip_is_pending(program: Path) -> None:
+    *_, homeless, cleared, _, homed = live(
+        program,
+        report(messages.hello(1)),
+        "slip",
+        report(messages.set_home(2, 0, 0)),
+        report(messages.poll(3, 0)),
+        report(messages.disable(4)),
+        report(messages.set_home(5, 0, 0)),
+        report(messages.poll(6, 0)),
+    )
+    assert isinstance(homeless, messages.State)
+    assert isinstance(cleared, messages.State)
+    assert isinstance(homed, messages.State)
+    assert (homeless.flags, homeless.fault) == (0, SENSOR)
+    assert (cleared.flags, cleared.fault) == (0, 0)
+    assert (homed.flags, homed.fault) == (messages.HOMED, 0)
 
 
 def test_being_switched_on_is_no_fault(program: Path) -> None:

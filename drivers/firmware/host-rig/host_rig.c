@@ -25,7 +25,9 @@ struct host_rig {
     uint16_t buttons;
     bool home_switch;
     uint32_t syncs;
-    struct rig_problem problem;
+    struct rig_problem problem; /* what is present */
+    struct rig_problem slip;    /* what was seen of the sensor */
+    bool slips_when_driven;
 
     struct message sent[QUEUE];
     size_t first, count;
@@ -74,18 +76,26 @@ static void turn_sync(void *board)
 
 static void drive(void *board, uint8_t axis, int32_t force_un)
 {
-    ((struct host_rig *)board)->force_un[axis] = force_un;
+    struct host_rig *host = board;
+    host->force_un[axis] = force_un;
+    if (host->slips_when_driven) {
+        host->slips_when_driven = false;
+        host->slip = (struct rig_problem){RIG_SENSOR_FAULT, axis, host->position[axis]};
+    }
 }
 
 static bool problem(void *board, struct rig_problem *problem)
 {
-    *problem = ((struct host_rig *)board)->problem;
+    const struct host_rig *host = board;
+    *problem = host->slip.fault != RIG_NO_FAULT ? host->slip : host->problem;
     return problem->fault != RIG_NO_FAULT;
 }
 
-static void forget_problem(void *board)
+static void forget_problem(void *board, uint8_t fault)
 {
-    (void)board; /* it is present until host_rig_mend() */
+    if (fault == RIG_SENSOR_FAULT) {
+        ((struct host_rig *)board)->slip.fault = RIG_NO_FAULT;
+    }
 }
 
 static void send(void *board, const uint8_t *bytes, uint8_t length)
@@ -128,6 +138,7 @@ void host_rig_restart(struct host_rig *host)
     memset(&host->receiver, 0, sizeof host->receiver);
     host->count = host->frame_length = host->frame_read = 0;
     host->now_us = 0;
+    host->slip.fault = RIG_NO_FAULT;
     rig_start(&host->rig, &host->description, &HAL, host);
 }
 
@@ -165,6 +176,14 @@ void host_rig_set_home_switch(struct host_rig *host, bool closed)
 void host_rig_break(struct host_rig *host, uint8_t fault, uint8_t axis, int32_t detail)
 {
     host->problem = (struct rig_problem){fault, axis, detail};
+    if (fault == RIG_SENSOR_FAULT) {
+        host->slip = host->problem;
+    }
+}
+
+void host_rig_slip_when_driven(struct host_rig *host)
+{
+    host->slips_when_driven = true;
 }
 
 void host_rig_mend(struct host_rig *host)

@@ -29,9 +29,13 @@ void host_rig_set_position(struct host_rig *host, uint8_t axis, int32_t counts);
 void host_rig_set_buttons(struct host_rig *host, uint16_t bits);
 void host_rig_set_home_switch(struct host_rig *host, bool closed);
 
-/* Let something go wrong; it is seen at the next work, and lasts until the cause is gone. */
+/* Let something go wrong, one thing at a time; it is seen at the next work, and lasts until the cause is gone. A slip of
+ * the sensor is remembered until the rig forgets it, as an interrupt's is. */
 void host_rig_break(struct host_rig *host, uint8_t fault, uint8_t axis, int32_t detail);
 void host_rig_mend(struct host_rig *host);
+
+/* Let the sensor slip while the motor is next told something: in the midst of the rig's work. */
+void host_rig_slip_when_driven(struct host_rig *host);
 
 /* What the motor of an axis is told [uN]. */
 int32_t host_rig_force(const struct host_rig *host, uint8_t axis);

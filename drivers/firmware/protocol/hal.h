@@ -40,8 +40,10 @@ struct rig_hal {
     bool (*home_switch)(void *board);
     void (*sync)(void *board); /* a position is taken for a tick: turn the sync output, where there is one */
     void (*drive)(void *board, uint8_t axis, int32_t force_un);       /* 0: the motor is without current */
-    bool (*problem)(void *board, struct rig_problem *problem);        /* is there one, seen or still present? */
-    void (*forget_problem)(void *board);                              /* what was seen; what is present stays */
+    /* Is there one, seen or still present? The sensor's before any other. */
+    bool (*problem)(void *board, struct rig_problem *problem);
+    /* What was seen of this fault: not of others, which the core may not know of yet, nor what is still present. */
+    void (*forget_problem)(void *board, uint8_t fault);
     void (*send)(void *board, const uint8_t *message, uint8_t length); /* whole or not at all, without waiting */
 };
 

@@ -25,14 +25,18 @@ static void switch_off(struct rig *rig)
 static void look_for_problems(struct rig *rig)
 {
     struct rig_problem problem;
-    if (rig->fault != RIG_NO_FAULT || !rig->hal->problem(rig->board, &problem)) {
+    if (!rig->hal->problem(rig->board, &problem) || problem.fault == rig->fault) {
+        return;
+    }
+    bool slipped = problem.fault == RIG_SENSOR_FAULT;
+    if (rig->fault != RIG_NO_FAULT && !slipped) {
         return;
     }
     switch_off(rig);
-    rig->fault = problem.fault;
+    rig->fault = problem.fault; /* a slip in the place of any other, behind which it would be forgotten */
     bool knows_home = rig->description->capabilities & RIG_KNOWS_HOME;
-    if (problem.fault == RIG_SENSOR_FAULT && problem.axis < rig->description->axes && !knows_home) {
-        rig->homed = (uint8_t)(rig->homed & ~(1 << problem.axis)); /* counts were lost: the origin has moved */
+    if (slipped && !knows_home) {
+        rig->homed = 0; /* counts were lost: the origin has moved; all, since another axis may hide behind this one */
     }
     say_fault(rig, &problem);
 }
@@ -83,10 +87,11 @@ static void disable(struct rig *rig)
 {
     struct rig_problem problem;
     switch_off(rig);
-    rig->hal->forget_problem(rig->board);
-    if (!rig->hal->problem(rig->board, &problem)) {
+    rig->hal->forget_problem(rig->board, rig->fault);
+    if (!rig->hal->problem(rig->board, &problem) || problem.fault != rig->fault) {
         rig->fault = RIG_NO_FAULT;
     }
+    look_for_problems(rig); /* one that was hidden behind it, or is new */
 }
 
 static int32_t limited_to(int32_t force_un, uint32_t limit_un)
@@ -158,7 +163,9 @@ static void carry_out(struct rig *rig, uint8_t type, const uint8_t *payload)
         break;
     case RIG_SET_HOME:
         rig->home[payload[0]] = get_i32(payload + 1);
-        rig->homed = (uint8_t)(rig->homed | 1 << payload[0]);
+        if (rig->fault != RIG_SENSOR_FAULT) { /* then it may have been found before counts were lost */
+            rig->homed = (uint8_t)(rig->homed | 1 << payload[0]);
+        }
         say_axis(rig, payload[0]);
         break;
     case RIG_DESCRIBE:

@@ -19,7 +19,7 @@ static const struct rig_description DESCRIPTION = {
     .buttons = 2, /* the push button, and the TTL input */
     .host_silence_ms = HOST_SILENCE_MS,
     .nominal_rate_hz = NOMINAL_RATE_HZ,
-    .firmware = {1, 2, 0},
+    .firmware = {1, 2, 1},
     .model = MODEL,
     .serial = SERIAL,
     .axis = {{COUNT_PM, MAX_FORCE_UN, LOWEST_COUNTS, HIGHEST_COUNTS}},
@@ -98,11 +98,14 @@ static bool problem(void *board, struct rig_problem *problem)
     return false;
 }
 
-static void forget_problem(void *board)
+static void forget_problem(void *board, uint8_t fault)
 {
     (void)board;
-    sensor_forget();
-    reset_cause = 0;
+    if (fault == RIG_SENSOR_FAULT) {
+        sensor_forget();
+    } else if (fault == RIG_RESTART_FAULT) {
+        reset_cause = 0;
+    }
 }
 
 static void send(void *board, const uint8_t *message, uint8_t length)
