@@ -299,17 +299,23 @@ class RigDriver(Driver[RigOptionsT]):
             try:
                 self._let_forces_through(urgent=False)
                 homes = [self._calibrated(mover, axis) for axis in range(len(self._maps))]
+                mover.push(0, 0.0)
+                # All this before the motor is off: the message that switches it off clears a fault as well, and counts
+                # that were lost on the way here would be forgotten with it.
+                for index, home in enumerate(homes):
+                    if home is not None:
+                        self._home_in_doubt = True
+                        talk.set_home(index, home)
+                        self._maps[index].put_home(home)
+                state = talk.state()
+                if state.fault:  # of its sensor, perhaps: what it has counted since is not known
+                    self._home_in_doubt = True
+                    raise self._stopped(state)
             finally:
                 talk.disable(urgent=False)
-            for index, home in enumerate(homes):
-                if home is not None:
-                    self._home_in_doubt = True
-                    talk.set_home(index, home)
-                    self._maps[index].put_home(home)
             state = talk.state()
-            if state.fault:  # of its sensor, perhaps: what it has counted since is not known
-                self._home_in_doubt = True
-                raise self._stopped(state)
+            if not state.flags & HOMED:
+                raise DeviceFaultError(f"{self.NAME}: the rig has just lost its home: calibrate once more")
             self._home_in_doubt = False
             self._sign.checked = True
             self._accept(state)

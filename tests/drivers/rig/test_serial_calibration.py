@@ -16,6 +16,7 @@ from hapticd.errors import (
 )
 from hapticd_drivers.rig import conversation
 from hapticd_drivers.rig.conversation import Conversation
+from hapticd_drivers.rig.messages import State
 from hapticd_drivers.rig.serial_rig import SerialRig
 from tests.drivers.rig.device import HALF_TRAVEL_M, PATIENCE_S, Rig
 from tests.drivers.rig.ticking import PERIOD_S, MakeDriver, settle, tick
@@ -203,6 +204,34 @@ def test_a_slip_before_the_rig_is_told_its_home_fails_the_calibration(
     with pytest.raises(DriverStateError, match="hapticd calibrate"):
         driver.enable()
     assert rig.force_n == 0.0
+    driver.calibrate()
+    driver.enable()
+
+
+def test_a_slip_as_the_motor_is_switched_off_fails_the_calibration(
+    rig: Rig, make_driver: MakeDriver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The home of before was told after it, was believed, and force was let through."""
+    driver = make_driver(axes=[{"homing": "here"}], sign_checked=True)
+    driver.open()
+    disable, before = Conversation.disable, []
+
+    def late(talk: Conversation, urgent: bool) -> State:
+        before.append(rig.force_n)
+        if len(before) == 2:
+            rig.break_down(1, 0, 0)
+            rig.mend()
+        return disable(talk, urgent)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Conversation, "disable", late)
+        with pytest.raises(DeviceFaultError, match="has just lost its home: calibrate once more"):
+            driver.calibrate()
+    assert before == [0.0, 0.0], "no force while the rig is told its home"
+    settle(rig, driver)
+    assert not driver.read().calibrated
+    with pytest.raises(DriverStateError, match="hapticd calibrate"):
+        driver.enable()
     driver.calibrate()
     driver.enable()
 
