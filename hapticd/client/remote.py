@@ -45,7 +45,7 @@ class DrivenState:
         impulse_n_s: what pulls at the target, summed over time since the daemon has it [N s].
         target_m: where the target or the object was in this tick, behind what was sent for it by the limits [m].
         seq: the client's number of the message in force; -1 when there is none.
-        age_s: how old what it says was, since the daemon took it [s].
+        age_s: how old what it says was: since it was sent, or the daemon took it where that is not known [s].
         state: `idle`, `held` and the like: docs/remote.md has them all.
         work_j: what moving it has put into its spring so far [J].
     """
@@ -125,6 +125,7 @@ class RemotePort:
         self.seq = 0
         self._endpoint = scene
         self._said: dict[str, Any] = {}
+        self._moved_seq = 0  # of the message that said last how it moves
         self._newest: RemoteState | None = None
         self._since: RemoteState | None = None
         self._mean_n: tuple[float, ...] = ()
@@ -191,6 +192,7 @@ class RemotePort:
             ValueError: what is to be numbers is not.
         """
         self._say(
+            moves=True,
             position_m=position_m,
             velocity_m_per_s=velocity_m_per_s,
             orientation=orientation,
@@ -290,13 +292,17 @@ class RemotePort:
             raise ClientError(f'{self._endpoint}: no "{self.name}" in the scene; there is {", ".join(names)}')
         return hello
 
-    def _say(self, **values: Any) -> None:
+    def _say(self, *, moves: bool = False, **values: Any) -> None:
         self._look()
         self._said.update((key, _numbers(key, value)) for key, value in values.items() if value is not None)
         for key in [key for key, value in values.items() if value is None]:
             self._said.pop(key, None)
         self.seq += 1
+        if moves:
+            self._moved_seq = self.seq
         message = {"name": self.name, "seq": self.seq, "sent_ns": time.monotonic_ns(), **self._said}
+        if 0 < self._moved_seq < self.seq:
+            message["moved_seq"] = self._moved_seq
         if self._newest is not None:
             message["state_seq"] = self._newest.seq
         self._sending.send(msgpack.packb(message), zmq.NOBLOCK)

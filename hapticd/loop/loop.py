@@ -252,7 +252,7 @@ class ControlLoop:
         def wait(deadline_ns: int) -> int:
             woke_ns = sleep_until(deadline_ns)
             if words[REMOTE] != said.seen:
-                said.take()
+                said.take(woke_ns)
             for port in ports:
                 if port.news is not None:
                     session.report_port(port)

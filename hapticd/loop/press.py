@@ -51,6 +51,7 @@ class Press:
         self._count += 1
         self._move()
         for port, update in self._said:
+            update.stamp(update.said, self._count)
             port.take(update)
         self._tick.advance(self._sample, self._tick.period_s)
 

@@ -59,11 +59,16 @@ class SlotReader:
         self._list_before = 0
         self._update = Update()
 
-    def serve(self, ports: Sequence[Port]) -> None:
-        """Take updates for these ports from now on; of what was written before only what has yet to be taken."""
+    def serve(self, ports: Sequence[Port], now_ns: int) -> None:
+        """Take updates for these ports from now on; of what was written before only what has yet to be taken.
+
+        Args:
+            ports: in the order of the scene.
+            now_ns: CLOCK_MONOTONIC [ns].
+        """
         number = list_of((port.name, port.kind) for port in ports)
         if number != self._list:
-            self.take()
+            self.take(now_ns)
             goes_on = {(port.name, port.kind): port for port in ports}
             self._heirs = [goes_on.get((port.name, port.kind)) for port in self._ports]
             self._list_before = self._list
@@ -73,8 +78,12 @@ class SlotReader:
         self._list = number
         self._shared.words[PORTS] = number
 
-    def take(self) -> None:
-        """Hand each port what was said of it since the last time; what is just being written waits for the next."""
+    def take(self, now_ns: int) -> None:
+        """Hand each port what was said of it since the last time; what is just being written waits for the next.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC, by which it is known how old what was said is [ns].
+        """
         written = self._shared.words[REMOTE]
         words = self._words
         counters = self._counters
@@ -94,7 +103,7 @@ class SlotReader:
             counters[index] = counter
             port = self._meant(meant, index)
             if port is not None:
-                port.take(update)
+                port.take(update, max(0.0, (now_ns - (update.sent_ns or update.received_ns)) * 1e-9))
         if whole:
             self.seen = written
 

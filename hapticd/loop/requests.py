@@ -180,7 +180,7 @@ class RequestHandler:
                 yield from self._beside(partial(field_of, Path(each.file)))
         yield from tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
         session.shared.layout.serve(tick)
-        session.said.serve(tick.ports)
+        session.said.serve(tick.ports, session.deadline_ns)
         session.stall_ns = int(new_safety.supervisor_stall_s * 1e9)
         if not keep_law:
             session.law_count += 1

@@ -50,7 +50,7 @@ class Session:
         self.stall_ns = int(stall_s * 1e9)
         self.stop_requested = False
         self.said = SlotReader(shared)
-        self.said.serve(tick.ports)
+        self.said.serve(tick.ports, 0)
         tick.guard.latched = resume.latched
         words = shared.words
         words[NEXT_SEQ] = resume.seq

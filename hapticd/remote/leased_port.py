@@ -10,7 +10,7 @@ from typing import Any
 from hapticd.config.ports import PortLimits
 from hapticd.remote.delays import DelayHistogram
 from hapticd.remote.message import LARGEST_NUMBER, examine, merge
-from hapticd.tick.remote.update import RELEASED, Update
+from hapticd.tick.remote.update import MOTION, RELEASED, Update
 
 _LONGEST_DELAY_NS = 10_000_000_000  # a client that says that it sent a message earlier has another clock
 _REMEMBERED = 64
@@ -52,7 +52,7 @@ class LeasedPort:
         update: all that its owner has said.
         owner: the client that it belongs to; None: to none.
         messages: taken.
-        late: messages that came behind a newer one and were passed over.
+        late: messages that were passed over: they came behind a newer one, or their client had gone.
         refused: messages that were not taken.
         ages: from a message's sending to the end of the tick that it was first in force at.
         round_trips: from the tick whose state a message answers to the tick that it was first in force at.
@@ -70,6 +70,8 @@ class LeasedPort:
         self.round_trips = DelayHistogram()
         self._under_way: deque[tuple[int, int, int]] = deque(maxlen=_REMEMBERED)
         self._in_force = -1
+        self._moved_seq = -1
+        self._moved_ns = 0
 
     def owner_at(self, now_ns: int) -> Sender | None:
         """Whom the port belongs to now."""
@@ -101,12 +103,16 @@ class LeasedPort:
         if owner is None:
             self.update = Update()
             self._under_way.clear()
+            self._moved_seq = -1
         self.owner = sender  # who has another connection by now, perhaps
         self.update.received_ns = now_ns  # a message that is late shows that its sender lives
         if said.seq <= self.update.seq:
             self.late += 1
             return False
-        merge(said, self.update)
+        if said.bits & MOTION and said.moved_seq > self._moved_seq:  # else it repeats what was said of motion before
+            self._moved_seq = said.moved_seq
+            self._moved_ns = now_ns
+        merge(said, self.update, self._moved_ns)
         known = sender.local and said.sent_ns and 0 <= now_ns - said.sent_ns <= _LONGEST_DELAY_NS
         self.update.sent_ns = said.sent_ns if known else 0
         self.messages += 1

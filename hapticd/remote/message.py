@@ -34,7 +34,7 @@ FASTEST_TURN_RAD_PER_S = 100.0
 LARGEST_NUMBER = 1 << 62
 """Numbers of messages are below it."""
 
-_SAID_OF = {"name", "seq", "sent_ns", "state_seq"}
+_SAID_OF = {"name", "seq", "sent_ns", "state_seq", "moved_seq"}
 _MOTION = {"position_m": POSITION, "velocity_m_per_s": VELOCITY}
 _SPRING = {"stiffness_n_per_m": STIFFNESS, "damping_n_s_per_m": DAMPING}
 _KEYS = {
@@ -53,6 +53,7 @@ class Said:
         seq: the client's number of it.
         sent_ns: when the client says that it sent it [ns of its CLOCK_MONOTONIC]; 0 where it does not.
         state_seq: tick of the state that it answers, -1 where it does not say.
+        moved_seq: number of the message that first said the motion in this one; its own where it does not say.
         values: what it says of the port, by the names of `Update`.
         bits: the same as `Update.said` has it.
     """
@@ -60,6 +61,7 @@ class Said:
     seq: int
     sent_ns: int
     state_seq: int
+    moved_seq: int
     values: dict[str, list[float] | float]
     bits: int
 
@@ -89,6 +91,9 @@ def examine(fields: Mapping[str, Any], port: PortLimits, axes: int) -> Said:
     seq = _count(fields.get("seq"), "seq")
     sent_ns = _count(fields.get("sent_ns", 0), "sent_ns")
     state_seq = _count(fields["state_seq"], "state_seq") if "state_seq" in fields else -1
+    moved_seq = _count(fields.get("moved_seq", seq), "moved_seq")
+    if moved_seq > seq:
+        raise WrongMessageError(f"moved_seq = {moved_seq}: must be at most seq = {seq}, the number of this message")
     values: dict[str, list[float] | float] = {}
     bits = 0
     for key, value in fields.items():
@@ -103,13 +108,18 @@ def examine(fields: Mapping[str, Any], port: PortLimits, axes: int) -> Said:
             error.key = key[:40]
             raise
         bits |= known[key]
-    return Said(seq, sent_ns, state_seq, values, bits)
+    return Said(seq, sent_ns, state_seq, moved_seq, values, bits)
 
 
-def merge(said: Said, update: Update) -> None:
+def merge(said: Said, update: Update, moved_ns: int) -> None:
     """Put what a message says into all that was said before.
 
     A velocity belongs to the position that it came with: a message with another position and no velocity ends it.
+
+    Args:
+        said: the message.
+        update: all that was said before.
+        moved_ns: when what first said its motion was taken [ns].
     """
     over = RELEASED
     if said.bits & POSITION:
@@ -118,6 +128,7 @@ def merge(said: Said, update: Update) -> None:
         over |= TURNING
     update.said = update.said & ~over | said.bits
     update.seq = said.seq
+    update.stamp(said.bits, moved_ns)
     for key, value in said.values.items():
         if isinstance(value, list):
             getattr(update, key)[: len(value)] = value

@@ -164,8 +164,12 @@ class SceneSocket:
             refusal = Refusal(str(name)[:40], f"no such name in the scene; there is {known}")
             self._refusals.add(identity, refusal, now_ns)
             return
+        sender = self._sender(port, identity, descriptor, frame)
+        if fields.get("release") is not True and has_ended(sender.descriptor, sender.inode):
+            port.late += 1  # it waited, and who said it has gone
+            return
         try:
-            if port.take(fields, self._sender(port, identity, descriptor, frame), len(self._axes), now_ns):
+            if port.take(fields, sender, len(self._axes), now_ns):
                 self._write(port)
             self._refusals.taken(identity, port.limits.name)
         except NotTakenError as error:

@@ -56,7 +56,7 @@ def ports() -> list[HeardPort]:
 @pytest.fixture
 def reader(shared: SharedMemory, ports: list[HeardPort]) -> SlotReader:
     reader = SlotReader(shared)
-    reader.serve(ports)
+    reader.serve(ports, 0)
     return reader
 
 
@@ -73,8 +73,8 @@ def test_what_is_said_of_a_port_is_taken_once_and_by_that_port(
 ) -> None:
     writer = SlotWriter(shared, PORTS)
     writer.write(1, at(0.25))
-    reader.take()
-    reader.take()
+    reader.take(0)
+    reader.take(0)
     assert [update.position_m[0] for update in ports[1].heard] == [0.25]
     assert ports[0].heard == []
     assert reader.seen == shared.words[REMOTE]
@@ -90,7 +90,7 @@ def test_the_word_counts_the_updates_and_a_tick_without_one_looks_at_nothing_els
         writer.write(number % 2, at(0.1))
         assert shared.words[REMOTE] == number + 1
         assert reader.seen == number
-        reader.take()
+        reader.take(0)
         assert reader.seen == number + 1
     SlotWriter(shared, PORTS)
     assert shared.words[REMOTE] == 3
@@ -102,7 +102,7 @@ def test_the_word_counts_the_updates_and_a_tick_without_one_looks_at_nothing_els
 def test_a_loop_that_has_no_ports_yet_takes_nothing_and_waits_for_nothing(shared: SharedMemory) -> None:
     reader = SlotReader(shared)
     SlotWriter(shared, PORTS).write(0, at(0.1))
-    reader.take()
+    reader.take(0)
     assert reader.seen == shared.words[REMOTE] == 1
 
 
@@ -112,7 +112,7 @@ def test_of_several_updates_the_latest_is_taken(
     writer = SlotWriter(shared, PORTS)
     for number in range(5):
         writer.write(0, at(number, seq=number))
-    reader.take()
+    reader.take(0)
     assert [update.seq for update in ports[0].heard] == [4]
 
 
@@ -123,12 +123,12 @@ def test_a_slot_that_is_just_being_written_waits_and_holds_no_other_up(
     writer.write(0, at(0.1))
     writer.write(1, at(0.2))
     shared.remote_words[0] -= 1  # as it is until the last store
-    reader.take()
+    reader.take(0)
     assert ports[0].heard == []
     assert [update.position_m[0] for update in ports[1].heard] == [0.2]
     assert reader.seen != shared.words[REMOTE], "it is looked for again"
     shared.remote_words[0] += 1
-    reader.take()
+    reader.take(0)
     assert [update.position_m[0] for update in ports[0].heard] == [0.1]
     assert len(ports[1].heard) == 1
     assert reader.seen == shared.words[REMOTE]
@@ -145,11 +145,11 @@ def test_what_a_killed_writer_has_left_half_done_is_taken_for_no_port(
         guard = shared.remote_words[word]
         after = SlotWriter(shared, PORTS)
         assert shared.remote_words[word] == guard + 1, "it counts on, so that no reader takes it for what it has seen"
-        reader.take()
+        reader.take(0)
         assert port.heard == []
         assert reader.seen == shared.words[REMOTE], "and it costs no tick any more"
         after.write(index, at(0.3))
-        reader.take()
+        reader.take(0)
         assert [update.position_m[0] for update in port.heard] == [0.3]
 
 
@@ -180,15 +180,15 @@ def test_an_update_for_another_list_of_ports_is_taken_for_no_other_name(
 ) -> None:
     before = SlotWriter(shared, PORTS)
     assert before.in_force
-    reader.serve([ports[1], ports[0]])
+    reader.serve([ports[1], ports[0]], 0)
     before.write(0, at(0.1))  # meant for the tool, which goes on
-    reader.take()
+    reader.take(0)
     assert [len(port.heard) for port in ports] == [1, 0]
     assert not before.in_force
     after = SlotWriter(shared, reversed(PORTS))
     assert after.in_force
     after.write(0, at(0.2))
-    reader.take()
+    reader.take(0)
     assert len(ports[1].heard) == 1
 
 
@@ -198,14 +198,14 @@ def test_what_was_said_to_a_port_that_has_gone_is_not_heard_when_it_comes_back(
     """Its client may have gone since: one that was killed had a coupling pull the hand 19 mm away."""
     writer = SlotWriter(shared, PORTS)
     for there in ([], ports[:1]):
-        reader.serve(there)
+        reader.serve(there, 0)
         writer.write(1, at(0.1))  # before the other side knows that it has gone
-        reader.take()
-        reader.serve(ports)
-        reader.take()
+        reader.take(0)
+        reader.serve(ports, 0)
+        reader.take(0)
         assert ports[1].heard == []
     writer.write(1, at(0.2))
-    reader.take()
+    reader.take(0)
     assert len(ports[1].heard) == 1
 
 
@@ -214,20 +214,34 @@ def test_what_is_said_while_another_port_comes_reaches_the_one_that_stays(
 ) -> None:
     """A release, which is said once: it was dropped, and the force stayed until the port's time was over."""
     reader = SlotReader(shared)
-    reader.serve(ports[1:])
+    reader.serve(ports[1:], 0)
     writer = SlotWriter(shared, PORTS[1:])
     writer.write(0, at(0.1))
-    reader.serve(ports)
+    reader.serve(ports, 0)
     writer.write(0, at(0.2))
-    reader.take()
+    reader.take(0)
     assert [len(port.heard) for port in ports] == [0, 2]
+
+
+@pytest.mark.parametrize(
+    ("sent_ns", "received_ns", "age_s"), [(0, 2_000_000, 3e-3), (1_000_000, 2_000_000, 4e-3), (0, 6_000_000, 0.0)]
+)
+def test_what_was_said_is_as_old_as_it_is_known_to_be(
+    shared: SharedMemory, reader: SlotReader, ports: list[HeardPort], sent_ns: int, received_ns: int, age_s: float
+) -> None:
+    """From when it was sent, where that is known; what came after the loop woke is new."""
+    said = at(0.1)
+    said.sent_ns, said.received_ns = sent_ns, received_ns
+    SlotWriter(shared, PORTS).write(0, said)
+    reader.take(5_000_000)
+    assert ports[0].ages_s == pytest.approx([age_s])
 
 
 def test_a_new_loop_hears_nothing_that_was_said_to_the_one_before(shared: SharedMemory, ports: list[HeardPort]) -> None:
     SlotWriter(shared, PORTS).write(0, at(0.1))
     reader = SlotReader(shared)
-    reader.serve(ports)
-    reader.take()
+    reader.serve(ports, 0)
+    reader.take(0)
     assert ports[0].heard == []
 
 
@@ -241,12 +255,12 @@ def test_lists_are_told_apart_by_names_kinds_and_order() -> None:
 def test_every_port_that_a_scene_can_have_has_a_slot_of_its_own(shared: SharedMemory) -> None:
     ports = [HeardPort(TOOL) for _ in range(MOST_PORTS)]
     reader = SlotReader(shared)
-    reader.serve(ports)
+    reader.serve(ports, 0)
     writer = SlotWriter(shared, ((port.name, port.kind) for port in ports))
     records = bytes(shared.record_area)
     for index in range(MOST_PORTS):
         writer.write(index, at(float(index), seq=index))
-    reader.take()
+    reader.take(0)
     assert [[update.seq for update in port.heard] for port in ports] == [[index] for index in range(MOST_PORTS)]
     assert bytes(shared.record_area) == records
     assert len(shared.remote) == MOST_PORTS * SLOT_BYTES
@@ -261,10 +275,10 @@ def test_no_update_is_torn_while_another_process_writes_as_fast_as_it_can_and_is
         assert hammer.stdout is not None
         hammer.stdout.readline()
         while min(len(port.heard) for port in ports) < 300:
-            reader.take()
+            reader.take(0)
         os.kill(hammer.pid, signal.SIGKILL)
     SlotWriter(shared, PORTS)
-    reader.take()
+    reader.take(0)
     assert reader.seen == shared.words[REMOTE]
     for parity, port in enumerate(ports):
         for update in port.heard:

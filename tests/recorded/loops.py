@@ -207,6 +207,8 @@ class Loop:
             else:
                 setattr(update, name, value)
         update.seq = self._number
+        update.received_ns = self.clock.now_ns
+        update.stamp(update.said, update.received_ns)
         SlotWriter(self.shared, [(each.name, each.kind) for each in self.tick.ports]).write(port, update)
 
     def _sleep_until(self, deadline_ns: int) -> int:

@@ -12,14 +12,16 @@ BALL = PortLimits("ball", "object", 0.1, 1000.0, 0.0, 0.0, 1.0)
 
 
 class HeardPort(Port):
-    """Keeps every update that it was given."""
+    """Keeps every update that it was given, and how old it was."""
 
     def __init__(self, limits: PortLimits, axes: int = 1) -> None:
         super().__init__(limits, axes)
         self.heard: list[Update] = []
+        self.ages_s: list[float] = []
 
-    def take(self, update: Update) -> None:
+    def take(self, update: Update, age_s: float = 0.0) -> None:
         self.heard.append(copied(update))
+        self.ages_s.append(age_s)
 
 
 def copied(update: Update) -> Update:

@@ -54,6 +54,7 @@ class Tick:
     port_n: float
     in_force: int
     held: bool
+    age_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +88,14 @@ class Session:
     last_seen: Tick | None = None
 
     @property
-    def heard(self) -> dict[int, int]:
-        """By tick the message that was first in force in it."""
-        found: dict[int, int] = {}
+    def heard(self) -> dict[int, tuple[int, float]]:
+        """By tick the message that was first in force in it, and how old it was when the tick began [s]."""
+        found: dict[int, tuple[int, float]] = {}
         last = -1
         for tick in self.ticks:
             if tick.in_force not in (last, -1):
-                found[tick.seq] = last = tick.in_force
+                last = tick.in_force
+                found[tick.seq] = last, max(0.0, tick.age_s - PERIOD_S)
         return found
 
     def unramped(self) -> list[Tick]:
@@ -168,7 +170,8 @@ def again(session: Session) -> list[float]:
     for tick in rehearsal.run(session.ticks[-1].seq + 1):
         found.append(rehearsal.tick.motion.position_m[0])
         if tick + 1 in heard:
-            port.take(said[heard[tick + 1]])
+            number, age_s = heard[tick + 1]
+            port.take(said[number], age_s)
     return found
 
 
@@ -194,8 +197,9 @@ def _under(session: Session, law: str) -> Outcome:
             simulator.step(step.passed_s, step.span_s, known[step.saw])
             _take(sent, limits, len(said), _fields(simulator.update))
             said.append(_copy(sent))
-        if tick + 1 in heard and heard[tick + 1] < len(said):
-            port.take(said[heard[tick + 1]])
+        number, age_s = heard.get(tick + 1, (len(said), 0.0))
+        if number < len(said):
+            port.take(said[number], age_s)
     return Outcome.DIVERGED if rehearsal.diverged else session.judged([seen.x_m for seen in known])
 
 
@@ -264,6 +268,7 @@ def _tick(frame: bytes) -> Tick:
         port["force_n"][0],
         port["seq"],
         port["state"] == "held",
+        port["age_s"],
     )
 
 
@@ -288,12 +293,13 @@ def _said(session: Session) -> list[Update]:
 def _take(update: Update, limits: PortLimits, number: int, fields: dict[str, list[float]]) -> None:
     """What the daemon does with a message: a simulator that goes astray says places that it refuses."""
     with contextlib.suppress(WrongMessageError):
-        merge(examine({"name": PORT, "seq": number, **fields}, limits, 1), update)
+        merge(examine({"name": PORT, "seq": number, **fields}, limits, 1), update, number)
 
 
 def _copy(update: Update) -> Update:
     copy = Update()
     copy.said, copy.seq = update.said, update.seq
+    copy.position_ns, copy.velocity_ns = update.position_ns, update.velocity_ns
     copy.position_m[:] = update.position_m
     copy.velocity_m_per_s[:] = update.velocity_m_per_s
     copy.force_n[:] = update.force_n

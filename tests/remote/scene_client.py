@@ -10,11 +10,12 @@ import msgpack
 import zmq
 
 
-def main(endpoint: str, name: str, value: float, pause_s: float) -> None:
+def main(endpoint: str, name: str, value: float, pause_s: float, tells_when: bool) -> None:
     socket = zmq.Context().socket(zmq.DEALER)
     socket.connect(endpoint)
     for seq in itertools.count(1):
-        socket.send(msgpack.packb({"name": name, "seq": seq, "position_m": [value]}))
+        when = {"sent_ns": time.monotonic_ns()} if tells_when else {}
+        socket.send(msgpack.packb({"name": name, "seq": seq, "position_m": [value], **when}))
         if seq == 1:
             sys.stdout.write("\n")
             sys.stdout.flush()
@@ -22,4 +23,4 @@ def main(endpoint: str, name: str, value: float, pause_s: float) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], float(sys.argv[3]), float(sys.argv[4]))
+    main(sys.argv[1], sys.argv[2], float(sys.argv[3]), float(sys.argv[4]), "when" in sys.argv)

@@ -57,9 +57,11 @@ def driven(daemon: Daemon, name: str = "tool") -> RemotePort:
 
 
 @contextlib.contextmanager
-def other_client(daemon: Daemon, value: float = 0.01, pause_s: float = 0.005) -> Iterator[subprocess.Popen[str]]:
-    """A client in a process of its own, which has sent its first message."""
-    command = [sys.executable, str(SCRIPT), f"ipc://{runtime(daemon)}/scene", "tool", str(value), str(pause_s)]
+def other_client(
+    daemon: Daemon, value: float = 0.01, pause_s: float = 0.005, *said: str
+) -> Iterator[subprocess.Popen[str]]:
+    """A client in a process of its own, which has sent its first message; with "when" it says when it sends."""
+    command = [sys.executable, str(SCRIPT), f"ipc://{runtime(daemon)}/scene", "tool", str(value), str(pause_s), *said]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None

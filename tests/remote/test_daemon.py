@@ -138,6 +138,44 @@ def test_a_client_that_is_killed_is_told_once_let_go_without_a_step_and_replaced
         assert back["seq"] >= out_tick - 1
 
 
+@pytest.mark.parametrize("dies", [True, False], ids=["a dead client", "one that stands still too"])
+def test_what_has_waited_for_a_process_that_stood_still_is_not_gone_by(daemon: Daemon, dies: bool) -> None:
+    """1.9 N for a client that was dead for two seconds: the message counted from when it was read."""
+    with driven(daemon) as other, other_client(daemon, 0.02, 0.005, *([] if dies else ["when"])) as client:
+        wait_until(lambda: other.state().ports["tool"].state == "held", "the other client to be in force")
+        process = remote_pid(daemon)
+        os.kill(process, signal.SIGSTOP)
+        try:
+            time.sleep(0.1)  # so that messages wait
+            os.kill(client.pid, signal.SIGKILL if dies else signal.SIGSTOP)
+            time.sleep(2.0 * HOLD_S)
+        finally:
+            os.kill(process, signal.SIGCONT)
+        came = other.state(20.0)
+        while came.deadline_ns < time.monotonic_ns() - 100_000_000:  # those of the standstill
+            came = other.state(20.0)
+        assert came.ports["tool"].state == "stale"
+        memory = daemon.memory()
+        until = came.seq + 300
+        wait_until(lambda: other.state(20.0).seq > until, "the time in which it would be in force")
+        after = [port.state for record in all_records(memory) if record.seq > came.seq for port in ports_of(record)]
+        memory.close()
+        assert set(after) == {PortState.STALE}
+
+
+def test_a_softer_spring_throws_a_moving_target_back_no_more(tool: RemotePort) -> None:
+    tool.move([0.0])
+    wait_until(lambda: abs(tool.state(20.0).ports["tool"].target_m[0]) < 1e-4, "the target to be there")
+    tool.move([0.0], [0.1])
+    ways_m = []
+    for turn in range(100):
+        if turn % 20 == 10:
+            tool.change(stiffness_n_per_m=100.0 + turn)
+        ways_m.append(tool.state(20.0).ports["tool"].target_m[0])
+    assert max(ways_m) > 2e-3
+    assert min(later - one for one, later in pairwise(ways_m)) > -1e-5
+
+
 def test_a_client_that_is_stopped_keeps_its_name_for_the_lease_and_then_loses_it(daemon: Daemon) -> None:
     with driven(daemon) as other, other_client(daemon) as client:
         wait_until(lambda: other.state().ports["tool"].state == "held", "the other client to be in force")

@@ -45,7 +45,7 @@ class Doors:
         self.shared = SharedMemory(RecordLayout(1, False, 1), 100.0)
         self.port = HeardPort(TOOL)
         self.loop = SlotReader(self.shared)
-        self.loop.serve([self.port])
+        self.loop.serve([self.port], 0)
         self.scene.serve([TOOL], SlotWriter(self.shared, [(TOOL.name, TOOL.kind)]), 3600.0, ("x",), 1000.0)
         self.context = zmq.Context()
         self.clients: list[Client] = []
@@ -55,7 +55,7 @@ class Doors:
         self.scene.receive()
         self.scene.turn()
         self.state.turn()
-        self.loop.take()
+        self.loop.take(0)
         self.seq += 1
         self.state.send({"seq": self.seq})
 

@@ -75,6 +75,24 @@ def test_a_message_behind_a_newer_one_is_passed_over_and_shows_that_its_sender_l
         say(port, TWO, 2700, 1)
 
 
+def test_motion_has_the_time_at_which_it_was_said_first(port: LeasedPort) -> None:
+    def said() -> tuple[int, int]:
+        return port.update.position_ns // MS, port.update.velocity_ns // MS
+
+    say(port, ONE, 1, 1, velocity_m_per_s=[0.1])
+    assert said() == (1, 1)
+    port.take({"seq": 2, "stiffness_n_per_m": 10.0}, ONE, 1, 2 * MS)
+    assert said() == (1, 1)
+    say(port, ONE, 3, 3, velocity_m_per_s=[0.1], moved_seq=1)
+    assert said() == (1, 1)
+    port.take({"seq": 4, "velocity_m_per_s": [0.2]}, ONE, 1, 4 * MS)
+    assert said() == (1, 4)
+    say(port, ONE, 5, 6, velocity_m_per_s=[0.1], moved_seq=5)  # what said it first was lost
+    assert said() == (5, 5)
+    say(port, TWO, 2000, 1, velocity_m_per_s=[0.1])
+    assert said() == (2000, 2000)
+
+
 def test_letting_go_is_told_and_frees_the_name(port: LeasedPort) -> None:
     say(port, ONE, 0, 5, stiffness_n_per_m=100.0)
     with pytest.raises(NotTakenError):

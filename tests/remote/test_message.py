@@ -34,7 +34,7 @@ from tests.remote.heard import BALL, FIELD, TOOL, copied
 
 KEYS = (
     "position_m", "velocity_m_per_s", "force_n", "orientation", "angular_velocity_rad_per_s", "stiffness_n_per_m",
-    "damping_n_s_per_m", "seq", "sent_ns", "state_seq", "name", "position", "\x00",
+    "damping_n_s_per_m", "seq", "sent_ns", "state_seq", "moved_seq", "name", "position", "\x00",
 )  # fmt: skip
 NUMBERS = st.one_of(st.floats(), st.integers(-(2**63), 2**64 - 1))
 VALUES = st.one_of(
@@ -48,7 +48,7 @@ def said_all(update: Update) -> list[object]:
 
 def taken(port: PortLimits, axes: int = 1, **fields: Any) -> Update:
     update = Update()
-    merge(examine({"seq": 1, **fields}, port, axes), update)
+    merge(examine({"seq": 1, **fields}, port, axes), update, 0)
     return update
 
 
@@ -64,7 +64,7 @@ def test_whatever_comes_is_refused_whole_or_is_finite_and_within_limits(
     except WrongMessageError:
         assert said_all(update) == before
         return
-    merge(said, update)
+    merge(said, update, 0)
     vectors = (update.position_m, update.velocity_m_per_s, update.angular_velocity_rad_per_s, update.force_n)
     assert all(math.isfinite(number) for vector in (*vectors, update.orientation) for number in vector)
     assert math.hypot(*update.velocity_m_per_s) <= port.max_speed_m_per_s * (1.0 + 1e-12)
@@ -91,6 +91,7 @@ def test_whatever_comes_is_refused_whole_or_is_finite_and_within_limits(
         (BALL, {"position_m": [0.0]}, "position_m: must be a list of 3 numbers"),
         (BALL, {"orientation": [0.0, 0.0, 0.0, 0.0]}, "orientation: must be a quaternion w x y z, of length 1"),
         (TOOL, {"seq": -1}, "seq: must be a whole number, 0 or more"),
+        (TOOL, {"moved_seq": 2}, "moved_seq = 2: must be at most seq = 1, the number of this message"),
         (TOOL, {"seq": None}, "seq: must be a whole number, 0 or more"),
     ],
 )  # fmt: skip
@@ -156,7 +157,7 @@ def test_what_is_just_beyond_a_limit_is_refused_and_its_key_named(port: PortLimi
     assert refused.value.key == key[:40]
 
 
-@pytest.mark.parametrize("key", ["seq", "sent_ns", "state_seq"])
+@pytest.mark.parametrize("key", ["seq", "sent_ns", "state_seq", "moved_seq"])
 @pytest.mark.parametrize("value", [-1, LARGEST_NUMBER, True, 1.0, "1", None])
 def test_what_is_no_number_of_a_message_is_refused(key: str, value: object) -> None:
     with pytest.raises(WrongMessageError, match=f"{key}: must be a whole number, 0 or more"):
@@ -165,7 +166,7 @@ def test_what_is_no_number_of_a_message_is_refused(key: str, value: object) -> N
 
 def test_a_message_that_does_not_say_when_and_to_what_it_was_sent_says_nothing_of_that() -> None:
     said = examine({"name": "tool", "seq": 4}, TOOL, 1)
-    assert (said.seq, said.sent_ns, said.state_seq, said.values, said.bits) == (4, 0, -1, {}, 0)
+    assert (said.seq, said.sent_ns, said.state_seq, said.moved_seq, said.values, said.bits) == (4, 0, -1, 4, {}, 0)
 
 
 def test_each_key_is_said_by_a_bit_of_its_own() -> None:
@@ -201,11 +202,11 @@ def test_a_force_beyond_the_limit_keeps_its_direction() -> None:
 
 def test_what_was_said_before_stays_but_for_the_velocity_of_another_place() -> None:
     update = Update()
-    merge(examine({"seq": 1, "position_m": [0.1], "velocity_m_per_s": [0.5]}, TOOL, 1), update)
-    merge(examine({"seq": 2, "stiffness_n_per_m": 100}, TOOL, 1), update)
+    merge(examine({"seq": 1, "position_m": [0.1], "velocity_m_per_s": [0.5]}, TOOL, 1), update, 0)
+    merge(examine({"seq": 2, "stiffness_n_per_m": 100}, TOOL, 1), update, 0)
     assert update.said == POSITION | VELOCITY | STIFFNESS
     assert (update.position_m[0], update.velocity_m_per_s[0], update.stiffness_n_per_m) == (0.1, 0.5, 100.0)
-    merge(examine({"seq": 3, "position_m": [0.2]}, TOOL, 1), update)
+    merge(examine({"seq": 3, "position_m": [0.2]}, TOOL, 1), update, 0)
     assert update.said == POSITION | STIFFNESS
     assert update.seq == 3
 
@@ -213,14 +214,14 @@ def test_what_was_said_before_stays_but_for_the_velocity_of_another_place() -> N
 def test_a_turn_belongs_to_its_orientation() -> None:
     update = Update()
     pose = {"orientation": [1, 0, 0, 0], "angular_velocity_rad_per_s": [0, 0, 1]}
-    merge(examine({"seq": 1, **pose}, BALL, 3), update)
+    merge(examine({"seq": 1, **pose}, BALL, 3), update, 0)
     assert update.said == ORIENTATION | TURNING
-    merge(examine({"seq": 2, "orientation": [0, 1, 0, 0]}, BALL, 3), update)
+    merge(examine({"seq": 2, "orientation": [0, 1, 0, 0]}, BALL, 3), update, 0)
     assert update.said == ORIENTATION
 
 
 def test_who_speaks_again_has_not_let_go() -> None:
     update = Update()
     update.said = RELEASED | FORCE
-    merge(examine({"seq": 1, "force_n": [1.0]}, FIELD, 1), update)
+    merge(examine({"seq": 1, "force_n": [1.0]}, FIELD, 1), update, 0)
     assert update.said == FORCE

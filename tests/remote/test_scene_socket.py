@@ -24,6 +24,7 @@ from hapticd.loop.remote_slots import SlotReader, SlotWriter
 from hapticd.remote import refusals
 from hapticd.remote.scene_socket import MOST_AT_ONCE, SCHEMA, SceneSocket
 from hapticd.tick.record import RecordLayout
+from hapticd.tick.remote.update import RELEASED
 from tests.remote.heard import FIELD, TOOL, HeardPort
 
 PORTS = [TOOL, FIELD]
@@ -38,7 +39,7 @@ class Scene:
         self.shared = SharedMemory(RecordLayout(1, False, 8), 100.0)
         self.ports = [HeardPort(limits) for limits in PORTS]
         self.loop = SlotReader(self.shared)
-        self.loop.serve(self.ports)
+        self.loop.serve(self.ports, 0)
         self.socket = SceneSocket(self.path, None, None)
         self.serve(1.0)
 
@@ -49,7 +50,7 @@ class Scene:
     def turn(self) -> None:
         self.socket.receive()
         self.socket.turn()
-        self.loop.take()
+        self.loop.take(0)
 
     def until(self, condition: Any) -> None:
         end_s = time.monotonic() + PATIENCE_S
@@ -287,7 +288,7 @@ def test_after_a_reload_a_name_keeps_its_owner_and_another_list_is_not_mixed_up(
         one.say(name="field", seq=6, force_n=[2.0])  # before the loop has the new list
         scene.until(lambda: scene.socket.ports["field"].messages == 2)
         assert scene.ports[0].heard == []
-        scene.loop.serve([scene.ports[1]])
+        scene.loop.serve([scene.ports[1]], 0)
         two.say(name="field", seq=7, force_n=[0.5])
         assert "belongs to" in two.answer()["text"]
         one.say(name="field", seq=8, force_n=[1.5])
@@ -349,3 +350,21 @@ def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
     with pytest.raises(InstanceError, match="a file that is no socket is in the way"):
         SceneSocket(path, None, None)
     assert path.read_text() == "mine"
+
+
+def test_of_a_client_that_has_gone_only_its_letting_go_is_taken(scene: Scene) -> None:
+    """What it said may have waited for long."""
+    with Talker(scene) as one:
+        one.say(name="tool", seq=1, position_m=[0.01])
+        scene.until(lambda: scene.ports[0].heard)
+        owner = scene.socket.ports["tool"].owner
+        assert owner is not None
+        one.say(name="tool", seq=2, position_m=[0.02])
+        one.say(name="tool", release=True)
+        one.socket.close(1000)
+        one.context.term()
+    assert has_ended(owner.descriptor, owner.inode)
+    scene.until(lambda: len(scene.ports[0].heard) == 2)
+    assert scene.ports[0].heard[1].said & RELEASED
+    assert scene.ports[0].heard[1].position_m[0] == 0.01
+    assert scene.socket.ports["tool"].late == 1

@@ -125,6 +125,7 @@ def coupled(rate_hz: float, duration_s: float, law: str = "") -> Session:
         pose_m = list(device.position_m) if tick == 0 else stepped.arrived(tick)
         if pose_m is not None:
             update.seq += 1
+            update.stamp(POSITION, update.seq)
             update.position_m[:] = pose_m
             port.take(update)
         if stepped.is_due(tick):

@@ -11,6 +11,7 @@ from hapticd.tick.remote.one_port import OnePort, PortAxis
 from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.port_state import PortState
 from hapticd.tick.remote.ramped import Ramped
+from hapticd.tick.remote.said_motion import SaidMotion
 from hapticd.tick.remote.update import POSITION, VELOCITY, Update
 from hapticd.tick.space.channel import LEAST_M
 
@@ -34,7 +35,17 @@ class Coupling(OnePort):
         damping: of its damper, without the law's [N s/m].
     """
 
-    __slots__ = ("_asked", "_gone_m", "_left_s", "_speed_m_per_s", "_stretch_m", "_unsaid_s", "damping", "follower")
+    __slots__ = (
+        "_asked",
+        "_gone_m",
+        "_left_s",
+        "_said_motion",
+        "_speed_m_per_s",
+        "_stretch_m",
+        "_unsaid_s",
+        "damping",
+        "follower",
+    )
 
     def __init__(self, limits: PortLimits, site: PortSite) -> None:
         super().__init__(limits, site)
@@ -42,6 +53,7 @@ class Coupling(OnePort):
         self.target_m = self.follower.at_m
         self.damping = Ramped(limits.damping_n_s_per_m)
         self._asked = AskedSpring()
+        self._said_motion = SaidMotion()
         self._stretch_m = self._speed_m_per_s = 0.0
         self._gone_m = [0.0] * len(self.channels)  # of the followed target, since the last sample
         self._left_s = 0.0  # until spring and damper have come in
@@ -56,10 +68,20 @@ class Coupling(OnePort):
             self._asked.forget()
         self._aim()
 
+    def forget(self) -> None:
+        """Know nothing of a client until it says something anew."""
+        super().forget()
+        self._said_motion.forget()
+
     def _hear(self, update: Update) -> bool:
-        if not update.said & POSITION:
+        said = update.said
+        if not said & POSITION:
             return False
-        self.follower.aim(update.position_m, update.velocity_m_per_s if update.said & VELOCITY else None)
+        speed_ns = update.velocity_ns if said & VELOCITY else None
+        placed, sped = self._said_motion.hear(update.position_ns, speed_ns)
+        if placed or sped:
+            velocity_m_per_s = None if speed_ns is None else update.velocity_m_per_s
+            self.follower.aim(update.position_m if placed else None, velocity_m_per_s)
         self._asked.hear(update)
         self._aim()
         return True

@@ -29,6 +29,7 @@ class Follower:
 
     Attributes:
         at_m: where it is [m].
+        goal_m: where it is to be: what was said, moved on with its velocity [m].
         moved_m: its last move [m].
         speed_m_per_s: that over the time it took [m/s].
         max_speed_m_per_s, hold_s: the limits.
@@ -40,9 +41,9 @@ class Follower:
         "_axes",
         "_decay",
         "_dt_s",
-        "_goal_m",
         "_goal_m_per_s",
         "at_m",
+        "goal_m",
         "hold_s",
         "max_speed_m_per_s",
         "moved_m",
@@ -58,7 +59,7 @@ class Follower:
         self.moved_m = [0.0] * axes
         self.speed_m_per_s = [0.0] * axes
         self.rests = True
-        self._goal_m = [0.0] * axes
+        self.goal_m = [0.0] * axes
         self._goal_m_per_s = [0.0] * axes
         self._ahead_s = 0.0
         self._dt_s = 0.0
@@ -73,18 +74,19 @@ class Follower:
             self.moved_m[axis] = 0.0
         self.rests = False
 
-    def aim(self, position_m: Sequence[float], velocity_m_per_s: Sequence[float] | None = None) -> None:
+    def aim(self, position_m: Sequence[float] | None, velocity_m_per_s: Sequence[float] | None = None) -> None:
         """Go to where a client says that the target is now, and on with its velocity.
 
         Args:
-            position_m: one element an axis, whatever it is beyond [m].
+            position_m: one element an axis, whatever it is beyond; None: where it has come to by what was said [m].
             velocity_m_per_s: the same; None: it stands as far as is known [m/s].
         """
         share = 0.0
         if velocity_m_per_s is not None:
             share = _share(velocity_m_per_s, self._axes, self.max_speed_m_per_s)
         for axis in self._axes:
-            self._goal_m[axis] = min(max(position_m[axis], -MOST_M), MOST_M)
+            if position_m is not None:
+                self.goal_m[axis] = min(max(position_m[axis], -MOST_M), MOST_M)
             self._goal_m_per_s[axis] = 0.0 if velocity_m_per_s is None else share * velocity_m_per_s[axis]
         self._ahead_s = 0.0
         self.rests = False
@@ -112,8 +114,8 @@ class Follower:
             before = speed_m_per_s[axis]
             before_squared += before * before
             goal_m_per_s = goal_share * self._goal_m_per_s[axis]
-            off_m = self.at_m[axis] - self._goal_m[axis]
-            self._goal_m[axis] += goal_m_per_s * dt_s
+            off_m = self.at_m[axis] - self.goal_m[axis]
+            self.goal_m[axis] += goal_m_per_s * dt_s
             now = goal_m_per_s + keep * (before - goal_m_per_s) - lost * off_m / dt_s
             wanted.append(now)
             change_squared += (now - before) * (now - before)

@@ -103,11 +103,11 @@ class OnePort(Port):
         """Be in none any more; it must be asleep."""
         self.channels = []
 
-    def take(self, update: Update) -> None:
-        """Take what the client has said; called between ticks."""
+    def take(self, update: Update, age_s: float = 0.0) -> None:
+        """Take what the client has said, some time ago [s]; called between ticks."""
         if self.leaving:
             return
-        super().take(update)
+        super().take(update, age_s)
         if self.asleep and self.state is _HELD:
             self.asleep = False
             for channel in self.channels:

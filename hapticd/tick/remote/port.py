@@ -28,7 +28,7 @@ class Port:
         limits: in force now.
         state: how it stands with its client.
         seq: the client's own number of the message that is in force; -1: none is.
-        age_s: how long ago the last one came into force [s].
+        age_s: how old what it says is: since its client sent it, or the daemon took it where that is not known [s].
         force_n: force on the device that was applied last, one element an axis [N].
         impulse_n_s: the sum of the port's own force times how long it was applied, since the port exists. The law's
             damping is in it where it acts against the target; against the ground, its reaction is no client's [N s].
@@ -82,18 +82,21 @@ class Port:
         """Stiffness in force [N/m], damping of the law [N s/m] and the mass that it has felt [kg], for a record."""
         raise NotImplementedError
 
-    def take(self, update: Update) -> None:
+    def take(self, update: Update, age_s: float = 0.0) -> None:
         """Take what the client has said; called between ticks, keeps nothing of the update itself.
 
         Args:
             update: of this port; numbers beyond the port's limits count as the limit.
+            age_s: how old it is [s]. What has waited for longer than `hold_s` says nothing: who said it may have gone.
         """
         if update.said & RELEASED:
             if self.state is _HELD:
                 self._become(_RELEASED)
             return
+        if age_s > self.limits.hold_s:
+            return
         if self._hear(update):  # else it holds nothing: what another client has said before grows old
-            self.age_s = 0.0
+            self.age_s = age_s
             self.seq = update.seq
             if self.state is not _HELD:
                 self._become(_HELD)

@@ -13,6 +13,7 @@ from hapticd.tick.contact import RunningLaw
 from hapticd.tick.remote.asked_spring import AskedSpring
 from hapticd.tick.remote.follower import Follower
 from hapticd.tick.remote.port import Port, PortState
+from hapticd.tick.remote.said_motion import SaidMotion
 from hapticd.tick.remote.turning import Turning, unit
 from hapticd.tick.remote.update import DAMPING, ORIENTATION, POSITION, STIFFNESS, TURNING, VELOCITY, Update
 from hapticd.tick.space.channel import Channel, stretched_m
@@ -36,7 +37,16 @@ class RemoteObject(Port):
         turning: of its orientation.
     """
 
-    __slots__ = ("_asked", "_damping", "_stiffness", "contact", "follower", "turning")
+    __slots__ = (
+        "_asked",
+        "_damping",
+        "_said_motion",
+        "_said_turning",
+        "_stiffness",
+        "contact",
+        "follower",
+        "turning",
+    )
 
     contact: RemoteContact
 
@@ -47,6 +57,8 @@ class RemoteObject(Port):
         self.turning = Turning(first.orientation, _max_turning(limits, solid), limits.hold_s)
         self.target_m = self.follower.at_m
         self._asked = AskedSpring()
+        self._said_motion = SaidMotion()
+        self._said_turning = SaidMotion()
         self.take_surface(solid)
         self.stop(first.position_m)
 
@@ -84,6 +96,12 @@ class RemoteObject(Port):
         self._aim(solid)
         solid.stiffness_n_per_m, solid.damping_n_s_per_m = self._stiffness, self._damping
 
+    def forget(self) -> None:
+        """Know nothing of a client until it says something anew."""
+        super().forget()
+        self._said_motion.forget()
+        self._said_turning.forget()
+
     def stand(self) -> None:
         """Stay where it is, without a client; an event tells of one that was in force."""
         self.lose_client()
@@ -116,14 +134,16 @@ class RemoteObject(Port):
         said = update.said
         self._asked.hear(update)
         self._aim(self.contact.solid)
-        if said & (POSITION | VELOCITY):
-            at_m = update.position_m if said & POSITION else self.follower.at_m
-            self.follower.aim(at_m, update.velocity_m_per_s if said & VELOCITY else None)
-        if said & (ORIENTATION | TURNING):
-            self.turning.aim(
-                update.orientation if said & ORIENTATION else None,
-                update.angular_velocity_rad_per_s if said & TURNING else None,
-            )
+        speed_ns = update.velocity_ns if said & VELOCITY else None
+        placed, sped = self._said_motion.hear(update.position_ns if said & POSITION else None, speed_ns)
+        if placed or sped:
+            velocity_m_per_s = None if speed_ns is None else update.velocity_m_per_s
+            self.follower.aim(update.position_m if placed else None, velocity_m_per_s)
+        speed_ns = update.turning_ns if said & TURNING else None
+        placed, sped = self._said_turning.hear(update.orientation_ns if said & ORIENTATION else None, speed_ns)
+        if placed or sped:
+            turning_rad_per_s = None if speed_ns is None else update.angular_velocity_rad_per_s
+            self.turning.aim(update.orientation if placed else None, turning_rad_per_s)
         return bool(said & (POSITION | VELOCITY | ORIENTATION | TURNING | STIFFNESS | DAMPING))
 
     def _aim(self, solid: Solid) -> None:

@@ -38,11 +38,11 @@ class StreamedForce(OnePort):
         """Let go and come in within this time, and never more than `LET_GO_S`, from now on [s]."""
         super().set_ramp(min(ramp_s, LET_GO_S))
 
-    def take(self, update: Update) -> None:
-        """Take what the client has said; called between ticks."""
+    def take(self, update: Update, age_s: float = 0.0) -> None:
+        """Take what the client has said, some time ago [s]; called between ticks."""
         if update.said & RELEASED:  # what comes after it was chosen anew, the same or not
             self._same_s = 0.0
-        super().take(update)
+        super().take(update, age_s)
 
     def forget(self) -> None:
         """Know nothing of a client until it says something anew."""

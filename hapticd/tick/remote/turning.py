@@ -41,10 +41,10 @@ class Turning:
         """Turn to a client's orientation by the shorter way, and on with its angular velocity.
 
         Args:
-            orientation: of any length; None, or of none: as it is.
+            orientation: of any length; None, or of none: what it has come to by what was said.
             turning_rad_per_s: in the frame around; None: it stands as far as is known [rad/s].
         """
-        goal = (None if orientation is None else unit(orientation)) or self.now
+        goal = (None if orientation is None else unit(orientation)) or _turned(self.follower.goal_m, self._from)
         self._from = self.now
         speed = list(self.follower.speed_m_per_s)
         self.follower.begin((0.0, 0.0, 0.0), speed)
@@ -53,13 +53,7 @@ class Turning:
     def move(self, dt_s: float) -> None:
         """Go on by a tick [s]."""
         self.follower.move(dt_s)
-        x, y, z = self.follower.at_m
-        angle = sqrt(x * x + y * y + z * z)
-        if angle == 0.0:
-            self.now = self._from
-            return
-        share = sin(0.5 * angle) / angle
-        self.now = _product((cos(0.5 * angle), share * x, share * y, share * z), self._from)
+        self.now = _turned(self.follower.at_m, self._from)
 
 
 def unit(orientation: Sequence[float]) -> Quaternion | None:
@@ -70,6 +64,16 @@ def unit(orientation: Sequence[float]) -> Quaternion | None:
     w, x, y, z = (each / largest for each in orientation)
     length = sqrt(w * w + x * x + y * y + z * z)
     return w / length, x / length, y / length, z / length
+
+
+def _turned(way: Sequence[float], of: Quaternion) -> Quaternion:
+    """An orientation, turned on by a rotation vector in the frame around [rad]."""
+    x, y, z = way
+    angle = sqrt(x * x + y * y + z * z)
+    if angle == 0.0:
+        return of
+    share = sin(0.5 * angle) / angle
+    return _product((cos(0.5 * angle), share * x, share * y, share * z), of)
 
 
 def _product(a: Quaternion, b: Quaternion) -> Quaternion:

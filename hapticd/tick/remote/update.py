@@ -17,10 +17,12 @@ FORCE = 64
 RELEASED = 128
 """Bits of `Update.said`; of what was never said the field has no meaning."""
 
+MOTION = POSITION | ORIENTATION | VELOCITY | TURNING
+
 SLOT_BYTES = 256
 """What one port has in shared memory: an update and room for the words that guard it."""
 
-_FIELDS = Struct("<qqqq18d")
+_FIELDS = Struct("<8q18d")
 
 PACKED_BYTES = _FIELDS.size
 """How much of a slot an update takes."""
@@ -34,6 +36,8 @@ class Update:
         seq: the client's own number of its newest message.
         sent_ns: when the client sent it [ns of CLOCK_MONOTONIC]; 0 where it does not say, or is on another computer.
         received_ns: when the daemon took it [ns of CLOCK_MONOTONIC].
+        position_ns, velocity_ns, orientation_ns, turning_ns: when the daemon took what first said the position, the
+            velocity and so on that are in it: another one than before is said anew, the same one is only repeated [ns].
         position_m: of the target or the object, one element an axis, 0.0 beyond [m].
         velocity_m_per_s: of the same [m/s].
         angular_velocity_rad_per_s: of the object, in the frame of the world [rad/s].
@@ -47,13 +51,17 @@ class Update:
         "damping_n_s_per_m",
         "force_n",
         "orientation",
+        "orientation_ns",
         "position_m",
+        "position_ns",
         "received_ns",
         "said",
         "sent_ns",
         "seq",
         "stiffness_n_per_m",
+        "turning_ns",
         "velocity_m_per_s",
+        "velocity_ns",
     )
 
     def __init__(self) -> None:
@@ -61,6 +69,10 @@ class Update:
         self.seq = -1
         self.sent_ns = 0
         self.received_ns = 0
+        self.position_ns = 0
+        self.velocity_ns = 0
+        self.orientation_ns = 0
+        self.turning_ns = 0
         self.position_m = [0.0, 0.0, 0.0]
         self.velocity_m_per_s = [0.0, 0.0, 0.0]
         self.angular_velocity_rad_per_s = [0.0, 0.0, 0.0]
@@ -68,6 +80,22 @@ class Update:
         self.orientation = [1.0, 0.0, 0.0, 0.0]
         self.stiffness_n_per_m = 0.0
         self.damping_n_s_per_m = 0.0
+
+    def stamp(self, said: int, said_ns: int) -> None:
+        """Note when motion was said.
+
+        Args:
+            said: what of it, in bits.
+            said_ns: when the daemon took it, or another number that is new [ns].
+        """
+        if said & POSITION:
+            self.position_ns = said_ns
+        if said & VELOCITY:
+            self.velocity_ns = said_ns
+        if said & ORIENTATION:
+            self.orientation_ns = said_ns
+        if said & TURNING:
+            self.turning_ns = said_ns
 
 
 def pack(update: Update, view: memoryview | bytearray, at: int) -> None:
@@ -85,6 +113,10 @@ def pack(update: Update, view: memoryview | bytearray, at: int) -> None:
         update.seq,
         update.sent_ns,
         update.received_ns,
+        update.position_ns,
+        update.velocity_ns,
+        update.orientation_ns,
+        update.turning_ns,
         *update.position_m,
         *update.velocity_m_per_s,
         *update.angular_velocity_rad_per_s,
@@ -105,9 +137,10 @@ def unpack(view: memoryview | bytearray | bytes, at: int, into: Update) -> None:
     """
     values = _FIELDS.unpack_from(view, at)
     into.said, into.seq, into.sent_ns, into.received_ns = values[:4]
-    into.position_m[:] = values[4:7]
-    into.velocity_m_per_s[:] = values[7:10]
-    into.angular_velocity_rad_per_s[:] = values[10:13]
-    into.force_n[:] = values[13:16]
-    into.orientation[:] = values[16:20]
-    into.stiffness_n_per_m, into.damping_n_s_per_m = values[20:]
+    into.position_ns, into.velocity_ns, into.orientation_ns, into.turning_ns = values[4:8]
+    into.position_m[:] = values[8:11]
+    into.velocity_m_per_s[:] = values[11:14]
+    into.angular_velocity_rad_per_s[:] = values[14:17]
+    into.force_n[:] = values[17:20]
+    into.orientation[:] = values[20:24]
+    into.stiffness_n_per_m, into.damping_n_s_per_m = values[24:]

@@ -278,6 +278,7 @@ def _parsed(text: str) -> LoadedConfig:
 def _copy(update: Update) -> Update:
     copy = Update()
     copy.said, copy.seq = update.said, update.seq
+    copy.stamp(copy.said, copy.seq)
     copy.position_m[:] = update.position_m
     copy.velocity_m_per_s[:] = update.velocity_m_per_s
     copy.force_n[:] = update.force_n

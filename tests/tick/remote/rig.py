@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import count
 from typing import Any
 
 import pytest
@@ -45,6 +46,7 @@ max_force_n = 3.0
 """
 WALL = '[[scene.walls]]\naxis = "x"\nposition_m = 0.0\nstiffness_n_per_m = 3000.0\n'
 
+_NOW_NS = count()
 _BITS = {
     "position_m": POSITION,
     "orientation": ORIENTATION,
@@ -77,6 +79,7 @@ def update(seq: int = 0, released: bool = False, **said: Any) -> Update:
     """What a client says: vectors as long as the device has axes."""
     made = Update()
     made.seq = seq
+    made.stamp(-1, next(_NOW_NS))
     for name, value in said.items():
         made.said |= _BITS[name]
         if isinstance(value, float):

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from hapticd.tick.remote.port import PortState
-from tests.tick.remote.rig import PERIOD_S, Rig
+from tests.tick.remote.rig import PERIOD_S, Rig, update
 from tests.tick.remote.test_coupling import FOLLOW_N, RAMP_TICKS, STEP_N, held_at
 
 
@@ -46,6 +46,24 @@ def test_another_client_that_names_no_target_keeps_none_in_force() -> None:
         rig.go()
     assert rig.force == [0.0]
     assert rig["tool"].state is PortState.STALE
+
+
+def test_what_has_waited_for_longer_than_it_holds_says_nothing() -> None:
+    """Its client may be dead: 1.9 N for one that was, for two seconds."""
+    rig = Rig()
+    rig["tool"].take(update(1, position_m=[2e-3]), 0.101)
+    assert rig.go(ticks=300) == [0.0]
+    assert rig["tool"].state is PortState.IDLE
+
+
+def test_what_has_waited_is_let_go_so_much_sooner() -> None:
+    rig = Rig()
+    rig["tool"].take(update(1, position_m=[2e-3]), 0.0605)
+    states = []
+    for _ in range(42):
+        rig.go()
+        states.append(rig["tool"].state)
+    assert states == [PortState.HELD] * 39 + [PortState.STALE] * 3
 
 
 @pytest.mark.parametrize("law", ["late-cycle", "none"])

@@ -31,7 +31,7 @@ VECTORS = st.lists(NUMBERS, min_size=3, max_size=3)
 @st.composite
 def updates(draw: st.DrawFn) -> Update:
     update = Update()
-    for name in ("said", "seq", "sent_ns", "received_ns"):
+    for name in ("said", "seq", "sent_ns", "received_ns", "position_ns", "velocity_ns", "orientation_ns", "turning_ns"):
         setattr(update, name, draw(WORDS))
     for name in ("position_m", "velocity_m_per_s", "angular_velocity_rad_per_s", "force_n"):
         setattr(update, name, draw(VECTORS))
@@ -58,7 +58,9 @@ def test_an_update_comes_back_as_it_was_and_touches_nothing_beside_its_place(upd
 
 
 def test_an_update_lies_as_numbers_of_eight_bytes_little_end_first() -> None:
-    row = struct.pack("<4q18d", 71, 17, 5_000, 6_000, *[float(number) for number in range(18)])
+    row = struct.pack(
+        "<8q18d", 71, 17, 5_000, 6_000, 6_001, 6_002, 6_003, 6_004, *[float(number) for number in range(18)]
+    )
     assert len(row) == PACKED_BYTES <= SLOT_BYTES - 16
     update = Update()
     unpack(row, 0, update)
@@ -67,6 +69,10 @@ def test_an_update_lies_as_numbers_of_eight_bytes_little_end_first() -> None:
         "seq": 17,
         "sent_ns": 5_000,
         "received_ns": 6_000,
+        "position_ns": 6_001,
+        "velocity_ns": 6_002,
+        "orientation_ns": 6_003,
+        "turning_ns": 6_004,
         "position_m": [0.0, 1.0, 2.0],
         "velocity_m_per_s": [3.0, 4.0, 5.0],
         "angular_velocity_rad_per_s": [6.0, 7.0, 8.0],
@@ -88,6 +94,10 @@ def test_nothing_is_said_in_a_new_update_and_every_number_is_newer() -> None:
         "seq": -1,
         "sent_ns": 0,
         "received_ns": 0,
+        "position_ns": 0,
+        "velocity_ns": 0,
+        "orientation_ns": 0,
+        "turning_ns": 0,
         "position_m": [0.0] * 3,
         "velocity_m_per_s": [0.0] * 3,
         "angular_velocity_rad_per_s": [0.0] * 3,
