@@ -135,7 +135,7 @@ class ControlLoop:
         enabled = DriverState.ENABLED
         budget_ns = int(self._loop.law_budget * period_ns)
         budget = LawBudget(budget_ns)
-        most_late = max(BURST_TICKS, int(LATE_S * 1e9) // period_ns)
+        most_late = int(LATE_S * 1e9) // period_ns
         late = 0
         skipped = session.skipped
         area = shared.record_area
@@ -195,10 +195,13 @@ class ControlLoop:
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
             if guard.mode is disarmed:
                 late = 0  # what was missed of a force that has been let go counts for no other
-                if driver.state is enabled:
+                let_go = driver.state is enabled
+                if let_go:
                     driver.disable()
                 if self._stopping:
                     return
+                if let_go and driver.force_left:  # whoever opens it anew tries again, and by other ways
+                    raise DeviceProtocolError(f"it may not have let go: {driver.force_left}")
             if words[SUPERVISOR_BEAT] + session.stall_ns < woke_ns:
                 if not self._stalled:
                     self._stalled = True

@@ -29,6 +29,7 @@ class AtRest(Driver[DriverOptions]):
     Attributes:
         sample: what it says.
         before_read: done at each read.
+        on_disable: done as it lets go.
         refusal: why it lets no forces through, if it does not.
     """
 
@@ -37,6 +38,7 @@ class AtRest(Driver[DriverOptions]):
         self._declared = declared
         self.sample = Sample(1)
         self.before_read: Callable[[], None] = lambda: None
+        self.on_disable: Callable[[], None] = lambda: None
         self.refusal: DriverError | None = None
 
     def _open(self) -> DeviceInfo:
@@ -52,7 +54,8 @@ class AtRest(Driver[DriverOptions]):
 
     def _write(self, force_n: Sequence[float]) -> None: ...
 
-    def _disable(self) -> None: ...
+    def _disable(self) -> None:
+        self.on_disable()
 
     def _close(self) -> None: ...
 
@@ -70,6 +73,7 @@ class Started:
         config: the configuration.
         told: the events of the run, once it has ended.
         skipped: deadlines that were missed until then.
+        tick_number: of the tick that is next.
     """
 
     def __init__(self, clock: Clock, auto_arm: bool = True, text: str = WALL, **declared: Any) -> None:
@@ -84,7 +88,7 @@ class Started:
         )
         self.told: list[LoopEvent] = []
         self.skipped = 0
-        self._number = 0
+        self.tick_number = 0
         self._each_tick: Callable[[int], None] = lambda _number: None
         self._ticks = 0
 
@@ -92,13 +96,15 @@ class Started:
         """Tick so often, and end; `each_tick` is told the number of the one to come."""
         self._each_tick, self._ticks = each_tick, ticks
         events = EventReader(self.shared)
-        self.loop.run()
-        self.told = events.read()
-        self.skipped = self.shared.words[SKIPPED]
-        self.shared.close()
+        try:
+            self.loop.run()
+        finally:
+            self.told = events.read()
+            self.skipped = self.shared.words[SKIPPED]
+            self.shared.close()
 
     def _sleep_until(self, deadline_ns: int) -> int:
-        self._each_tick(self._number)
-        self._number += 1
-        self.loop.session.stop_requested = self._number > self._ticks
+        self._each_tick(self.tick_number)
+        self.tick_number += 1
+        self.loop.session.stop_requested = self.tick_number > self._ticks
         return self.clock.sleep_until(deadline_ns)

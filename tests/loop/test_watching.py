@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 
 import pytest
 
 from hapticd import plugins
 from hapticd.config.loading import parse
-from hapticd.loop.memory import ANSWERED, REQUESTS, SUPERVISOR_BEAT, RecordReader
+from hapticd.errors import DeviceFaultError, DeviceProtocolError
+from hapticd.loop.memory import ANSWERED, DISARM, REQUESTS, SUPERVISOR_BEAT, RecordReader
 from hapticd.loop.remote_slots import SlotWriter
 from hapticd.supervisor.reload import switch_request
 from hapticd.tick.event import EventCode, LoopEvent
@@ -117,6 +119,48 @@ def test_a_loop_that_misses_fifty_more_deadlines_than_it_meets_lets_go(clock: Cl
     assert event.text == "58 more deadlines were missed than met"
 
 
+@pytest.mark.parametrize("rate_hz", [100, 125, 1000, 4000])
+def test_fifty_milliseconds_are_as_many_at_every_rate(clock: Clock, rate_hz: int) -> None:
+    """At 100 Hz it took 100 ms to let go."""
+    started = Started(clock, text=f"{WALL}[loop]\nrate_hz = {rate_hz}\n")
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    period_s = 1.0 / rate_hz
+    missed_s = 0.05 + 0.5 * period_s
+
+    def each_tick(number: int) -> None:
+        started.driver.before_read = lambda: clock.pass_s({50: missed_s - period_s, 60: missed_s}.get(number, 0.0))
+
+    started.run(each_tick, 100)
+    assert [event.seq for event in told(started, EventCode.LOOP_LATE)] == [61]
+
+
+@pytest.mark.parametrize("stops", [False, True], ids=["disarmed", "stopped"])
+def test_a_device_that_does_not_let_go_is_given_up(clock: Clock, stops: bool) -> None:
+    """Disarmed was said, and the next thing heard of it came with the end of the daemon."""
+    started = Started(clock)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    asked: list[int] = []
+
+    def disable() -> None:
+        asked.append(started.tick_number)
+        if len(asked) == 1:
+            raise DeviceFaultError("the motor does not answer")
+
+    started.driver.on_disable = disable
+
+    def each_tick(number: int) -> None:
+        if number == 50 and not stops:
+            started.shared.words[DISARM] += 1
+
+    with contextlib.nullcontext() if stops else pytest.raises(DeviceProtocolError, match="it may not have let go: the"):
+        started.run(each_tick, 300)
+    lost = told(started, EventCode.DEVICE_LOST)
+    assert [event.text for event in lost] == ["device lost: it may not have let go: the motor does not answer"][stops:]
+    assert len(asked) == 2, "it is asked once more as it is closed"
+    assert (asked[0] < 200) is not stops
+    assert started.driver.force_left == ""
+
+
 def test_lateness_of_a_simulated_device_or_of_one_that_is_disarmed_takes_no_force_away(clock: Clock) -> None:
     slow = [*range(1000, 1010)]
     assert late(clock, slow, simulated=True) == []
@@ -158,7 +202,9 @@ def test_what_clients_drive_is_taken_and_told_when_it_is_let_go_and_when_it_is_b
             shared.post(switch_request(started.config, parse(LAW + TOOL, "with a tool")))
         if number in (200, 201, 400):
             assert shared.words[ANSWERED] == shared.words[REQUESTS]
-            SlotWriter(shared, TOOLS).write(0, at(1e-3, seq=number))
+            said = at(1e-3, seq=number)
+            said.received_ns = clock.now_ns
+            SlotWriter(shared, TOOLS).write(0, said)
         if number in (202, 402):
             in_force.append((number, started.tick.ports[0].seq))
 
@@ -169,7 +215,7 @@ def test_what_clients_drive_is_taken_and_told_when_it_is_let_go_and_when_it_is_b
     assert [event.fields for event in back] == [{"name": "tool"}]
     assert "its client is silent" in stale[0].text
     assert back[0].text == "tool: in force again"
-    assert 201 + 100 <= stale[0].seq <= 201 + 102
+    assert 200 + 100 <= stale[0].seq <= 200 + 102, "from when it was said, just after tick 200"
     assert 400 <= back[0].seq <= 401
 
 
