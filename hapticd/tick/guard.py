@@ -34,25 +34,30 @@ class BlendFields:
     blend_ticks: float  # periods from the old force to the new one
     blend_from_n: float  # the old force, held
     blend_from_x_m: float  # where it was applied
-    blend_limit_n: float  # largest force of one contact
+    blend_limit_n: float  # largest force that the new one comes to within these
 
 
 def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: int) -> None:
     """Begin a transition of one contact, from the force that is applied inside the wall.
 
+    One that holds more than the limit, against another that does, may go on to as much and takes so much longer: what
+    it lets go is the other's force on the device.
+
     Args:
         state: an object with the fields of `BlendFields`.
-        from_n: force applied now, outward, within the limit [N].
+        from_n: force applied now, outward [N].
         x_m: where, relative to the wall, < 0 [m].
         limit_n: largest force that one contact may come to [N].
         ticks: how many periods it takes.
     """
     state.blending = True
     state.blend_tick = -1.0
-    state.blend_ticks = float(ticks)
+    held_n = abs(from_n)
+    longer = held_n / limit_n if 0.0 < limit_n < held_n else 1.0
+    state.blend_ticks = longer * ticks
     state.blend_from_n = from_n
     state.blend_from_x_m = x_m
-    state.blend_limit_n = limit_n
+    state.blend_limit_n = longer * limit_n
 
 
 def begin_late(state: Any, periods: float) -> None:

@@ -241,6 +241,17 @@ def test_a_blend_that_begins_late_does_not_count_what_passed_before_and_one_that
     assert state.blend_tick == -1.0
 
 
+@pytest.mark.parametrize(("limit_n", "longer"), [(12.0, 2.0), (24.0, 1.0), (30.0, 1.0), (0.0, 1.0), (math.inf, 1.0)])
+def test_a_blend_from_more_than_the_limit_is_so_much_longer_and_goes_on_to_as_much(
+    limit_n: float, longer: float
+) -> None:
+    for from_n in (24.0, -24.0):
+        state = SimpleNamespace()
+        start_blend(state, from_n, -1.0, limit_n, 50)
+        assert state.blend_ticks == 50.0 * longer
+        assert state.blend_limit_n == limit_n * longer
+
+
 def test_limits_that_begin_to_move_after_the_last_tick_do_not_count_what_passed_before() -> None:
     """And a release does, whose force was held; what a tick was not told in time counts for no later one."""
     made = armed(max_force_n=8.0)

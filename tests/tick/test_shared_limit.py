@@ -34,7 +34,7 @@ def longest_step(forces_n: list[list[float]]) -> float:
 def test_a_wall_that_softens_by_a_tenth_does_not_turn_the_force_of_a_slot_round_at_once() -> None:
     """It went from 12 N to -12 N within a tick, and stayed there for 60 ms."""
     rig = Rig(*slot(50e3, 20e3, changes=changes(45e3)), at_m=0.0)
-    forces_n = rig.forces(-2e-3, 400)
+    forces_n = rig.forces(-2e-3, 1200)
     assert forces_n[0] == forces_n[-1] == pytest.approx(LIMIT_N)
     assert largest_step(forces_n) <= 2.0 * RAMP_STEP_N + 1e-9
 
@@ -54,7 +54,7 @@ def test_a_wall_that_softens_hands_its_share_of_the_limit_over_by_a_ramp() -> No
 def test_whatever_wall_changes_no_tick_turns_the_force_by_more_than_the_ramps_of_all(
     late: bool, before: list[float], after: float
 ) -> None:
-    """Two axes, two walls each: 2 limit / N for every wall that blends; where two balance, what one holds counts."""
+    """Two axes, two walls each: 2 limit / N for every wall that blends."""
     walls = [
         wall(stiffness, axis, position_m=at_m, free_side=side)
         for stiffness, (axis, (at_m, side)) in zip(
@@ -66,8 +66,20 @@ def test_whatever_wall_changes_no_tick_turns_the_force_by_more_than_the_ramps_of
     forces_n = rig.at(-2e-3, -2e-3, ticks=9 * RAMP_TICKS - 1)[-1:]  # all that it was armed in has come in
     forces_n += rig.at(-2e-3, -2e-3, dt_s=0.03 if late else 1e-3)
     forces_n += rig.at(-2e-3, -2e-3, ticks=8 * RAMP_TICKS)
-    held_n = [max(LIMIT_N, 2e-3 * stiffness) for stiffness in before]
-    assert longest_step(forces_n) <= sum(held_n) * 2.0 / RAMP_TICKS + 1e-9
+    assert longest_step(forces_n) <= 4.0 * 2.0 * RAMP_STEP_N + 1e-9
+
+
+@pytest.mark.parametrize("after_n_per_m", [0.0, 45e3, 60e3])
+def test_of_two_walls_that_balance_one_lets_go_no_faster_than_the_limit_allows(after_n_per_m: float) -> None:
+    """100 N against 100 N: what one let go within a ramp was on the device at a rate of 8 limits."""
+    walls = slot(50e3, 50e3)
+    walls[0]["changes"] = [{"at_s": 2.0, "stiffness_n_per_m": after_n_per_m}]
+    rig = Rig(*walls, at_m=0.0)
+    forces_n = rig.forces(-2e-3, 4000)
+    assert abs(forces_n[1900]) <= 1e-9
+    goal_n = min(max(2e-3 * (after_n_per_m - 50e3), -LIMIT_N), LIMIT_N)
+    assert forces_n[-1] == pytest.approx(goal_n)
+    assert largest_step(forces_n) <= 2.0 * RAMP_STEP_N + 1e-9
 
 
 @pytest.mark.parametrize("armed_inside", [True, False])
