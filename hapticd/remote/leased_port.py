@@ -52,7 +52,7 @@ class LeasedPort:
         update: all that its owner has said.
         owner: the client that it belongs to; None: to none.
         messages: taken.
-        late: messages that were passed over: they came behind a newer one, or their client had gone.
+        late: messages that were passed over: behind a newer one, older than `hold_s`, or of a client that had gone.
         refused: messages that were not taken.
         ages: from a message's sending to the end of the tick that it was first in force at.
         round_trips: from the tick whose state a message answers to the tick that it was first in force at.
@@ -115,6 +115,9 @@ class LeasedPort:
         merge(said, self.update, self._moved_ns)
         known = sender.local and said.sent_ns and 0 <= now_ns - said.sent_ns <= _LONGEST_DELAY_NS
         self.update.sent_ns = said.sent_ns if known else 0
+        if known and now_ns - said.sent_ns > self.limits.hold_s * 1e9:  # the loop does not go by it, but later ones may
+            self.late += 1
+            return True
         self.messages += 1
         self._under_way.append((said.seq, self.update.sent_ns or now_ns, said.state_seq))
         return True

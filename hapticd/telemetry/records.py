@@ -347,7 +347,8 @@ class Status:
         remote_owner: the client that it belongs to now; "" when to none.
         remote_messages: messages of clients that were taken for it.
         remote_refused: messages that were refused: wrong in themselves, or of another client than its owner.
-        remote_late: messages that were passed over: behind a newer one, or of a client that had gone.
+        remote_late: messages that were passed over: behind a newer one, older than `hold_s`, or of a client that had
+            gone.
         remote_age_histogram: messages by how long after their sending a tick was done with them; bins of
             `hapticd.remote.delays.DELAY_EDGES_MS`, one name after the other.
         remote_round_trip_histogram: messages by how long after the tick that they answer they were in force; the same

@@ -91,7 +91,8 @@ ROOMS = {
             f"hapticd/tick/remote/{name}.py"
             for name in (
                 "asked_spring", "books", "coupling", "follower", "line", "one_port", "port", "port_state", "ports",
-                "ramped", "port_site", "remote_object", "streamed_force", "tick_ports", "turning", "update",
+                "ramped", "port_site", "remote_object", "said_motion", "streamed_force", "tick_ports", "turning",
+                "update",
             )
         ),
         ("tests/tick/remote", RUNS),

@@ -25,7 +25,7 @@ QUICK = {
 }
 
 
-@pytest.mark.parametrize(("name", "seed"), [("guard", 24), ("energy", 87)])
+@pytest.mark.parametrize(("name", "seed"), [("guard", 17), ("energy", 87)])
 def test_every_slip_of_a_small_sample_is_found(name: str, seed: int) -> None:
     """Six of each, always the same ones, by the tests of the module alone; the one that changes nothing lives."""
     verdict = judge(QUICK[name], sample(QUICK[name], 6, seed))

@@ -75,6 +75,20 @@ def test_a_message_behind_a_newer_one_is_passed_over_and_shows_that_its_sender_l
         say(port, TWO, 2700, 1)
 
 
+def test_a_message_older_than_it_holds_counts_as_late_and_what_it_says_is_kept(port: LeasedPort) -> None:
+    """A client that says each thing once has said it all the same."""
+    hold_ms = round(1e3 * TOOL.hold_s)
+    assert say(port, ONE, 1 + hold_ms, 1, sent_ns=MS)
+    assert (port.messages, port.late) == (1, 0)
+    assert port.take({"seq": 2, "stiffness_n_per_m": 10.0, "sent_ns": MS}, ONE, 1, (2 + hold_ms) * MS)
+    assert (port.messages, port.late) == (1, 1)
+    assert port.update.said == POSITION | STIFFNESS
+    port.now_in_force(2, 7, (3 + hold_ms) * MS, MS)
+    assert sum(port.ages.counts) == 0
+    assert say(port, AFAR, 5000, 1, sent_ns=MS)
+    assert (port.messages, port.late) == (2, 1), "its clock is another one"
+
+
 def test_motion_has_the_time_at_which_it_was_said_first(port: LeasedPort) -> None:
     def said() -> tuple[int, int]:
         return port.update.position_ns // MS, port.update.velocity_ns // MS
