@@ -107,8 +107,8 @@ def _motors(name: str, motors: int) -> Callable[[Path], AbstractContextManager[D
                 one.watchdog_s = 1.0
                 controllers.append(one)
         axes = "\n".join(
-            f"[[device.options.axes]]\nid = {one.address}\nradius_m = 0.01\nmax_torque_n_m = 0.05\nlowest_m = -0.05\n"
-            'highest_m = 0.05\nhoming = "absolute"'
+            f"[[device.options.axes]]\nid = {one.address}\nradius_m = 0.01\nmax_torque_n_m = 0.05\nlowest_m = -0.03\n"
+            'highest_m = 0.03\nhoming = "absolute"'
             for one in controllers
         )
         options = f'channel = "{port}"\nsign_checked = true\nwatchdog_ms = 1000.0\n{axes}'

@@ -21,7 +21,8 @@ MOST_BYTES = 1 << 20
 class Courier(threading.Thread):
     """A connection to the service.
 
-    Each message that is sent brings one back. Only the newest that waits is sent: an old force is worth nothing.
+    Each message that is sent brings one back; what has come unasked before is no answer. Only the newest that waits is
+    sent: an old force is worth nothing.
 
     Args:
         url: of the service.
@@ -30,7 +31,7 @@ class Courier(threading.Thread):
         first: what the service said when it was reached.
         newest: the last message that has come.
         sent: messages that were given to it.
-        exchanges: how many messages have come back.
+        exchanges: how many messages have come back for one that was sent.
         dropped: messages that a newer one has replaced before they were sent.
         exchange_ns: how long the last message was on its way and back.
         failed: why the connection is gone; None while it is there.
@@ -129,6 +130,10 @@ class Courier(threading.Thread):
                 with self._lock:
                     message, self._outgoing = self._outgoing, None
                 if message is not None:
+                    with contextlib.suppress(TimeoutError):
+                        while True:  # what lies unread would be taken for the answer, and each one after it be older
+                            async with asyncio.timeout(0.0):
+                                self._arrive(await connection.recv())
                     started_ns = time.monotonic_ns()
                     await connection.send(message)
                     self._arrive(await connection.recv())

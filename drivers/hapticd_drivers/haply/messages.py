@@ -1,4 +1,4 @@
-"""What is said to Haply's Inverse service and what it says: JSON, one state for each message of the client.
+"""What is said to Haply's Inverse service and what it says: JSON, a state for each message of the client.
 
     -> {"inverse3": [{"device_id": "049D", "commands": {"set_cursor_force": {"vector": {"x": 0, "y": 0, "z": 0}}}}]}
     <- {"inverse3": [{"device_id": "049D", "state": {"cursor_position": {"x": ...}, "cursor_velocity": {...}}}],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 
-from hapticd.errors import DeviceFaultError, DeviceProtocolError, DeviceTimeoutError, DriverError
+from hapticd.errors import ConfigError, DeviceFaultError, DeviceProtocolError, DriverError
 from hapticd_drivers.moteus import registers
 from hapticd_drivers.moteus.faults import stopped_text
 from hapticd_drivers.moteus.registers import (
@@ -15,6 +15,7 @@ from hapticd_drivers.moteus.registers import (
     FAULTED,
     FIRMWARE,
     HOME_AT_OUTPUT,
+    HOME_AT_ROTOR,
     HOME_STATE,
     MILLISECONDS,
     MODE,
@@ -30,15 +31,24 @@ from hapticd_drivers.moteus.registers import (
     VOLTAGE,
     VOLTS,
 )
-from hapticd_drivers.motors.crew import Crew, Metered, Motor
+from hapticd_drivers.motors.crew import GREETING_PATIENCE_S, Crew, Metered, Motor
+from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.motors.link import BusLink
 
 _BACKWARDS = 0x80000000  # of a difference of two counts of milliseconds, which wrap after 49 days
 _LOOK_S = 0.005
 _WITHOUT_FORCE = (STOPPED, FAULTED, BRAKE)
 
-SAME_TURNS = 2.0 / 16384
-"""A controller whose home moves by less shows no difference: two counts of its encoder [turns]."""
+LEAST_MARK = 64.0
+MARK_TRAVELS = 8.0
+"""A home that hapticd tells is at so many turns at least, and at so many times the travel [turns].
+
+A controller that is switched on counts from within half a turn of 0, whatever it says of its home: no travel leads from
+there to the mark, so that who counts from it was told by hapticd.
+"""
+
+AT_ONCE_S = 0.005
+"""What a controller has said of its place says where home is for this time, since the handle may move [s]."""
 
 PREPARING_S = 0.3
 """For this time after it was enabled a controller may get ready, in which it gives no torque [s]."""
@@ -47,18 +57,38 @@ PREPARING_S = 0.3
 class MoteusMotor(Motor):
     """What is known of a controller and its motor.
 
+    Args:
+        drum: on its shaft.
+
     Attributes:
         restarted: it was switched off and on after the driver last looked whether it knows its home.
         most_n_m: torque that it may apply [N m].
+        absolute: it is to know by itself where it is: turn 0 is home.
+        mark_turns: where it counts a home that it is told, forwards or backwards from 0 [turns].
         mode, fault, home_state: its registers.
         firmware, serial: what it is; "" until it has said so.
     """
 
-    __slots__ = ("fault", "firmware", "home_state", "milliseconds", "mode", "most_n_m", "restarted", "serial")
+    __slots__ = (
+        "absolute",
+        "fault",
+        "firmware",
+        "home_state",
+        "mark_turns",
+        "milliseconds",
+        "mode",
+        "most_n_m",
+        "restarted",
+        "serial",
+    )
 
-    def __init__(self, address: int, most_n_m: float) -> None:
-        super().__init__(address)
-        self.most_n_m = most_n_m
+    def __init__(self, drum: Drum) -> None:
+        super().__init__(drum.options.id)
+        self.most_n_m = drum.options.max_torque_n_m
+        self.absolute = drum.options.homing == "absolute"
+        self.mark_turns = LEAST_MARK
+        while self.mark_turns < MARK_TRAVELS * drum.options.most_turns:
+            self.mark_turns *= 2.0  # a float has them all
         self.mode = STOPPED
         self.fault = 0
         self.home_state = 0
@@ -66,6 +96,13 @@ class MoteusMotor(Motor):
         self.restarted = False
         self.firmware = ""
         self.serial = ""
+
+    @property
+    def home_turns(self) -> float | None:
+        """Where it counts the home that it was told by hapticd [turns]; None: it has none, or lost it."""
+        mark_turns = math.copysign(self.mark_turns, self.turns)
+        marked = self.home_state == HOME_AT_OUTPUT and abs(self.turns - mark_turns) < 0.25 * self.mark_turns
+        return mark_turns if marked else None
 
 
 class MoteusCrew(Crew):
@@ -75,7 +112,7 @@ class MoteusCrew(Crew):
         link: the adapter.
         meter: keeps the metrics.
         name: of the driver.
-        motors: an address and a largest torque [N m] each.
+        motors: what is behind it, in the order of the axes.
         watchdog_s: goes with every torque [s].
         brake: short the windings to let go, and not just take the current away.
     """
@@ -87,13 +124,13 @@ class MoteusCrew(Crew):
         link: BusLink,
         meter: Metered,
         name: str,
-        motors: list[tuple[int, float]],
+        motors: list[MoteusMotor],
         watchdog_s: float,
         brake: bool,
     ) -> None:
         super().__init__(link, meter, name)
-        self._motors = [MoteusMotor(address, most_n_m) for address, most_n_m in motors]
-        self._by_identifier = {motor.address << 8: motor for motor in self._motors}
+        self._motors = motors
+        self._by_identifier = {motor.address << 8: motor for motor in motors}
         self._watchdog_s = watchdog_s
         self._let_go = registers.SHORTED if brake else registers.STOP
         self._enabled_ns = 0
@@ -111,6 +148,9 @@ class MoteusCrew(Crew):
         self._say_until(lambda index: self._send(index, registers.QUERY), lambda index: motors[index].heard)
         self.model = f"moteus (firmware {motors[0].firmware})"
         self.serial = " ".join(motor.serial for motor in motors)
+        misplaced = self._misplaced()
+        if misplaced:
+            raise ConfigError(misplaced)
         self.accept_restarts()
 
     def enable(self) -> None:
@@ -126,6 +166,9 @@ class MoteusCrew(Crew):
         for motor in self._motors:
             if motor.restarted:
                 raise self._has_restarted(motor)
+        misplaced = self._misplaced()
+        if misplaced:
+            raise DeviceFaultError(f"{self._name}: {misplaced}")
         self._enabled_ns = time.monotonic_ns()
         self._say_until(self._send_no_torque, self._follows, urgent=True)
 
@@ -165,30 +208,26 @@ class MoteusCrew(Crew):
         return None
 
     def set_home(self, turns: list[float | None]) -> None:
-        """Have each count from its home, which it remembers until it is switched off."""
-        motors = self._motors
-        before = [motor.turns for motor in motors]
-        after = list(before)
+        """Tell each its home, which it remembers until it is switched off.
 
-        def say(index: int) -> None:
-            home = turns[index]
-            if home is not None:
-                after[index] = motors[index].turns - home
-                self._send(index, registers.here_is(after[index]))
-            self._send(index, registers.QUERY)
-
-        def taken(index: int) -> bool:
-            """Whether it counts anew; its home state may speak of an older home."""
-            now = motors[index].turns
-            return motors[index].heard and abs(now - after[index]) <= max(abs(now - before[index]), SAME_TURNS)
-
-        refusal = DeviceProtocolError(f"{self._name}: a controller on {self.link.where} has not taken its home")
-        try:
-            self._say_until(say, taken)
-        except DeviceTimeoutError as error:
-            raise refusal if all(motor.heard for motor in motors) else error from None
-        if not self.absolute and None not in turns:
-            raise refusal
+        Each counts it at the other one of its two marks then, which shows that it has taken this one and not kept an
+        older one.
+        """
+        for index, (motor, home) in enumerate(zip(self._motors, turns, strict=True)):
+            if home is None:
+                continue
+            mark_turns = math.copysign(motor.mark_turns, -motor.turns)
+            states, end_s = motor.states, time.monotonic() + GREETING_PATIENCE_S
+            while motor.home_turns != mark_turns:
+                if time.monotonic() > end_s:
+                    if motor.states == states:
+                        raise self._silent([index], GREETING_PATIENCE_S)
+                    raise DeviceProtocolError(f"{self._name}: controller {motor.address} has not taken its home")
+                where = self._says(index, registers.QUERY)  # the handle may have moved since
+                if motor.restarted:
+                    raise self._has_restarted(motor)
+                if where and motor.home_turns != mark_turns:
+                    self._says(index, registers.here_is(motor.turns - home + mark_turns))
 
     def prove_watchdog(self) -> None:
         """Command nothing while a torque of 0 holds; questions feed no watchdog."""
@@ -203,6 +242,30 @@ class MoteusCrew(Crew):
             self.ask()
             self.await_states(_LOOK_S)
             self.note()
+
+    def _says(self, index: int, data: bytes) -> bool:
+        """Whether one answers at once; its state is new then."""
+        self.link.receive()  # what was said before is no answer
+        for motor in self._motors:
+            motor.heard = motor is not self._motors[index]
+        end_s = time.monotonic() + AT_ONCE_S
+        self._send(index, data)
+        return self.await_states(AT_ONCE_S) and time.monotonic() < end_s
+
+    def _misplaced(self) -> str:
+        """Which axis is to know by itself where it is and does not, and what to do; "" when there is none."""
+        for index, motor in enumerate(self._motors):
+            if not motor.absolute:
+                continue
+            where = f'device.options.axes[{index}].homing = "absolute": controller {motor.address}'
+            if motor.home_turns is not None:
+                return f"{where} counts from a home that it was told: switch it off and on"
+            if motor.home_state not in (HOME_AT_ROTOR, HOME_AT_OUTPUT):
+                return (
+                    f"{where} does not know where its shaft is (HOME_STATE {motor.home_state}): take another homing, "
+                    "or an encoder that knows"
+                )
+        return ""
 
     def _has_restarted(self, motor: MoteusMotor) -> DeviceFaultError:
         return DeviceFaultError(
@@ -249,7 +312,6 @@ class MoteusCrew(Crew):
                 motor.milliseconds = milliseconds
                 motor.states += 1
                 motor.heard = True
-                self.absolute = all(motor.home_state == HOME_AT_OUTPUT for motor in self._motors)
             if SERIAL in found:
                 words = (int(found[SERIAL + word]) & 0xFFFFFFFF for word in range(3))
                 motor.serial = "-".join(f"{word:08x}" for word in words)

@@ -9,7 +9,7 @@ from serial.tools import list_ports
 
 from hapticd.device import Diagnosis, FoundDevice
 from hapticd.errors import DeviceNotFoundError
-from hapticd_drivers.moteus.crew import MoteusCrew
+from hapticd_drivers.moteus.crew import MoteusCrew, MoteusMotor
 from hapticd_drivers.motors.adapters import found_interface, found_port
 from hapticd_drivers.motors.ascii_link import AsciiLink
 from hapticd_drivers.motors.crew import Crew
@@ -109,7 +109,7 @@ class Moteus(MotorDriver[MoteusOptions]):
 
     def _gather(self, link: BusLink) -> Crew:
         options = self.options
-        motors = [(axis.id, axis.max_torque_n_m) for axis in options.axes]
+        motors = [MoteusMotor(drum) for drum in self._drums]
         return MoteusCrew(link, self, self.NAME, motors, 1e-3 * options.watchdog_ms, options.brake)
 
     @property

@@ -22,8 +22,9 @@ SET_OUTPUT_EXACT = 0x131
 STOPPED, FAULTED, PREPARING, POSITION_MODE, TIMED_OUT, BRAKE = 0, 1, (2, 3, 4), 10, 11, 15
 """Values of MODE: without current, stopped by a fault, about to follow, following, timed out, windings shorted."""
 
-HOME_AT_OUTPUT = 2
-"""Value of HOME_STATE: turns count from a place that was told, or that an encoder at the output knows."""
+HOME_AT_ROTOR, HOME_AT_OUTPUT = 1, 2
+"""Values of HOME_STATE: turns count from the zero of an encoder, within a turn of it; or from a place that was told, or
+that motor_position.output.reference_source knows, as soon as it is switched on."""
 
 VOLTS = 0.5
 """A volt in an int8 [V]; temperatures are whole degrees."""
@@ -89,8 +90,8 @@ def torque(torque_n_m: float, most_n_m: float, timeout_s: float) -> bytes:
 
 
 def here_is(turns: float) -> bytes:
-    """From now on the shaft counts such that it is at these turns, and knows that (HOME_STATE)."""
-    return padded(struct.pack("<BBBf", 0x0D, 0xB1, 0x02, turns) + bytes((0x11, HOME_STATE)))
+    """From now on the shaft counts such that it is at these turns, and knows that (HOME_STATE); and the state."""
+    return padded(struct.pack("<BBBf", 0x0D, 0xB1, 0x02, turns) + _QUERY)
 
 
 def answers(data: bytes) -> dict[int, float] | None:

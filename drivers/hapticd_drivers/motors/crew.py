@@ -27,6 +27,9 @@ GREETING_S = 0.05
 GREETING_PATIENCE_S = 1.0
 """The same while a device is opened [s]."""
 
+RESTARTED_S = 0.05
+"""A controller that says nothing for this time may have been switched off and on, and count from elsewhere [s]."""
+
 
 class Metered(Protocol):
     """Keeps the metrics, which may move to other memory at any time."""
@@ -56,6 +59,11 @@ class Motor:
         self.states = 0
         self.heard = False
 
+    @property
+    def home_turns(self) -> float | None:
+        """Where its controller counts the home that it was told by hapticd [turns]; None: it has none, or lost it."""
+        return None
+
 
 class Crew(ABC):
     """The motors on a bus.
@@ -68,7 +76,6 @@ class Crew(ABC):
     Attributes:
         REMEMBERS: the controllers know where home is until they are switched off, once they were told.
         model, serial: of the controllers, once greeted.
-        absolute: they have been told, and have not been switched off since: turn 0 is home.
     """
 
     REMEMBERS: ClassVar[bool]
@@ -77,7 +84,6 @@ class Crew(ABC):
         self.link = link
         self.model = name
         self.serial = ""
-        self.absolute = False
         self._meter = meter
         self._name = name
         self._sent_ns = 0
@@ -94,6 +100,7 @@ class Crew(ABC):
         """Learn that all are there, and where they are; no force.
 
         Raises:
+            ConfigError: an axis is to know by itself where it is, and its controller does not.
             DriverError: one does not answer, or cannot be used.
         """
 
@@ -131,13 +138,15 @@ class Crew(ABC):
 
     @abstractmethod
     def set_home(self, turns: list[float | None]) -> None:
-        """Have the controllers count from their homes, which are at these turns now, if they can remember that.
+        """Tell the controllers their homes, which are at these turns now, if they can remember that.
+
+        They may count from elsewhere then: `Motor.home_turns`.
 
         Args:
             turns: one an axis; None where home is not to be changed.
 
         Raises:
-            DriverError: one has not taken it.
+            DriverError: one has not taken it, or has been switched off and on.
         """
 
     @abstractmethod

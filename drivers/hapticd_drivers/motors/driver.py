@@ -13,12 +13,11 @@ from hapticd.errors import (
     ConfigError,
     DeviceProtocolError,
     DeviceTimeoutError,
-    DriverError,
     DriverStateError,
 )
 from hapticd.trace import DriverTrace
 from hapticd_drivers.claims import Claims
-from hapticd_drivers.motors.crew import Crew
+from hapticd_drivers.motors.crew import RESTARTED_S, Crew
 from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.motors.link import BusLink, TracedLink
 from hapticd_drivers.motors.metrics import METRICS, TICKS_WITHOUT_STATE
@@ -36,9 +35,6 @@ SILENT_TICKS = 20
 
 By then its force has long gone: its own watchdog has stopped it, and the loop has stopped for a frozen device.
 """
-
-RESTARTED_S = 0.05
-"""A controller that says nothing for this time may have been switched off and on, and count from elsewhere [s]."""
 
 MOST_TURNS = 1e6
 """No shaft has turned so often."""
@@ -111,12 +107,12 @@ class MotorDriver(Driver[MotorOptionsT]):
         crew.note()
         for drum, motor in zip(self._drums, crew.motors, strict=True):
             options = drum.options
-            if crew.absolute or options.homing == "absolute":
-                drum.put(0.0, options.home_m)
-                drum.homed = True
+            home_turns = 0.0 if options.homing == "absolute" else motor.home_turns
+            drum.homed = home_turns is not None
+            if home_turns is not None:
+                drum.put(home_turns, options.home_m)
             else:  # it has been switched off perhaps: its middle will do until it is calibrated
                 drum.put(motor.turns, 0.5 * (options.lowest_m + options.highest_m))
-                drum.homed = False
         self._silent = 0
         self._sample.sequence = 0
         self._accept()
@@ -169,8 +165,10 @@ class MotorDriver(Driver[MotorOptionsT]):
                 problem = crew.problem()
                 if problem is not None:
                     raise problem
-            elif not crew.absolute and (crew.REMEMBERS or self._silent >= self._restarted_ticks):
-                self._forget_home()
+            elif crew.REMEMBERS or self._silent >= self._restarted_ticks:
+                for drum, motor in zip(self._drums, crew.motors, strict=True):
+                    if motor.home_turns is None:
+                        _forget_home(drum)
             if fresh:
                 crew.note()
                 self._silent = 0
@@ -222,11 +220,6 @@ class MotorDriver(Driver[MotorOptionsT]):
         sample.sequence += 1
         sample.calibrated = self._sign.checked and all(drum.homed for drum in self._drums)
 
-    def _forget_home(self) -> None:
-        """A controller has been switched off and on, as far as can be told, or was never told where home is."""
-        for drum in self._drums:
-            drum.homed = drum.options.homing == "absolute"
-
     def _bear_silence(self, crew: Crew) -> None:
         self.metrics[TICKS_WITHOUT_STATE] += 1.0
         self._silent += 1
@@ -240,6 +233,9 @@ class MotorDriver(Driver[MotorOptionsT]):
         with self._lock:
             crew = self._opened()
             mover = MotorMover(crew, self._drums, self._accept, lambda: self._called_off, self.period_s)
+            if not crew.REMEMBERS:  # one that restarts from here on is noticed only in that the calibration fails
+                for drum in self._drums:
+                    _forget_home(drum)
             try:
                 crew.disable()
                 crew.prove_watchdog()
@@ -251,14 +247,13 @@ class MotorDriver(Driver[MotorOptionsT]):
             homes = [
                 None if drum.options.homing == "absolute" else drum.turns(drum.options.home_m) for drum in self._drums
             ]
-            try:
-                crew.set_home(homes)
-            except DriverError:
-                self._forget_home()  # some may have taken theirs
-                raise
-            if crew.absolute:
-                for drum in self._drums:
-                    drum.put(0.0, drum.options.home_m)
+            for drum in self._drums:
+                _forget_home(drum)  # if one does not take its home, others may have
+            crew.set_home(homes)
+            for drum, motor in zip(self._drums, crew.motors, strict=True):
+                if motor.home_turns is not None:
+                    drum.put(motor.home_turns, drum.options.home_m)
+                drum.homed = True
             self._sign.checked = True
             self._accept()
             crew.ask()
@@ -286,11 +281,14 @@ class MotorDriver(Driver[MotorOptionsT]):
         else:
             counts, at_m = motion.find_stop(drive, -1.0 if options.homing == "low_stop" else 1.0), _end_m(drum)
         drum.put(counts / COUNTS_PER_TURN, at_m)
-        drum.homed = True
 
     def _opened(self) -> Crew:
         assert self._crew is not None
         return self._crew
+
+
+def _forget_home(drum: Drum) -> None:
+    drum.homed = drum.options.homing == "absolute"
 
 
 def _end_m(drum: Drum) -> float:

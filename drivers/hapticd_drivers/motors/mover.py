@@ -6,16 +6,15 @@ import time
 from collections.abc import Callable, Sequence
 
 from hapticd.errors import DeviceTimeoutError, DriverStateError
-from hapticd_drivers.motors.crew import Crew
+from hapticd_drivers.motors.crew import RESTARTED_S, Crew
 from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.rig.motion import Moment
 
 COUNTS_PER_TURN = 1 << 20
 """Resolution of the places that a movement is given: finer than any encoder."""
 
-ANSWER_S = 0.05
 MOST_TRIPS = 10
-"""A state is waited for this long [s]; so often may the watchdog trip, since a calibration is no real-time program."""
+"""So often may the watchdog trip, or a state be lost, since a calibration is no real-time program."""
 
 
 class MotorMover:
@@ -59,13 +58,18 @@ class MotorMover:
             crew.push(torques)
             self._due_s = max(self._due_s + self._period_s, time.monotonic())
             time.sleep(max(0.0, self._due_s - time.monotonic()))
-            if crew.await_states(ANSWER_S):
+            if crew.await_states(RESTARTED_S):
                 crew.note()
                 problem = crew.problem()
                 if problem is None:
                     break
             else:
-                problem = DeviceTimeoutError("a motor has not answered in time during the calibration")
+                problem = DeviceTimeoutError(
+                    f"a motor on {crew.link.where} has said nothing for {1e3 * RESTARTED_S:g} ms during the "
+                    "calibration: was it switched off and on, or is its cable loose?"
+                )
+                if not crew.REMEMBERS:  # its silence is all that shows that it may count from elsewhere
+                    raise problem
             self._trips += 1
             if self._trips > MOST_TRIPS:
                 raise problem

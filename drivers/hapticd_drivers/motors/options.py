@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import Field
@@ -11,6 +12,9 @@ from hapticd_drivers.motors.link import AUTO
 from hapticd_drivers.trace import TraceOptions
 
 MOST_AXES = 3
+
+MOST_ABSOLUTE_TURNS = 0.5
+"""No encoder tells one turn from the next: a controller that is switched on takes the one that is next to 0."""
 
 
 class DrumOptions(Table):
@@ -49,6 +53,12 @@ class DrumOptions(Table):
     )
     counts_per_turn: int = Field(16384, ge=8, le=1 << 24, description="of the encoder, at the shaft that is reported")
 
+    @property
+    def most_turns(self) -> float:
+        """Farthest that the shaft is from home in the travel [turns]."""
+        way_m = max(abs(end_m - self.home_m) for end_m in (self.lowest_m, self.highest_m))
+        return way_m * self.gear / (2.0 * math.pi * self.radius_m)
+
 
 class MotorOptions(TraceOptions):
     """Which adapter, which motors, and what a calibration may do."""
@@ -82,7 +92,7 @@ def refuse_axes(options: MotorOptions) -> None:
     """Refuse axes that cannot be.
 
     Raises:
-        ValueError: two with one address, or a travel without length.
+        ValueError: two with one address, a travel without length, or of more turns than an absolute encoder knows.
     """
     seen = set()
     for index, axis in enumerate(options.axes):
@@ -92,3 +102,9 @@ def refuse_axes(options: MotorOptions) -> None:
         if axis.id in seen:
             raise ValueError(f"{key}.id = {axis.id}: another axis has this address")
         seen.add(axis.id)
+        if axis.homing == "absolute" and axis.most_turns >= MOST_ABSOLUTE_TURNS:
+            raise ValueError(
+                f'{key}.homing = "absolute": the encoder knows where the shaft is within a turn, which turns up to '
+                f"{axis.most_turns:.2g} times from home_m: take another homing, or keep lowest_m and highest_m within "
+                "half a turn of home_m"
+            )

@@ -50,15 +50,16 @@ class Cursor:
 class FakeService:
     """The service, on a port of its own.
 
-    One inventory when a client comes; then one state for each of its messages, and never one unasked. A force is
-    applied once: a message without one ends it. A millisecond passes with each message, so that load on this computer
-    means nothing to the cursor.
+    One inventory when a client comes; then one state for each of its messages, and none unasked unless it is told to. A
+    force is applied once: a message without one ends it. A millisecond passes with each message, so that load on this
+    computer means nothing to the cursor.
 
     Attributes:
         cursor: of the one device.
         device: its name; "" when none is plugged in.
         mute: it takes messages and says nothing.
         spoil: the next messages go out as this text.
+        unasked: so many states more follow the next answer.
         messages: that have come.
         peak_n: largest force that has come since this was set to 0.
         accepts: how it calls a force; all that the public pages name.
@@ -69,6 +70,7 @@ class FakeService:
         self.device = "049D"
         self.mute = False
         self.spoil: list[str] = []
+        self.unasked = 0
         self.messages = 0
         self.peak_n = 0.0
         self.accepts: tuple[str, ...] = ("vector", "values")
@@ -110,8 +112,10 @@ class FakeService:
                     self._obey(json.loads(message))
                     self.messages += 1
                     answer = self.spoil.pop(0) if self.spoil else self._said(first=False)
+                    unasked, self.unasked = self.unasked, 0
                 if not self.mute:
-                    client.send(answer)
+                    for _ in range(1 + unasked):
+                        client.send(answer)
         except (ConnectionClosed, OSError):
             pass
         finally:

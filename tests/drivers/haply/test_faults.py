@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import threading
@@ -143,6 +144,52 @@ def test_the_answer_to_the_force_before_is_none_to_the_zero(
     assert service.cursor.force_n == [0.0, 0.0, PUSH_N]
     assert "did not answer" in driver.force_left
     goes_on.set()
+    driver.close()
+
+
+def press_and_hear_unasked(service: FakeService, driver: Inverse3, unasked: int) -> None:
+    """A force, its answer, and states that lie unread then."""
+    courier = driver._opened()
+    exchanges = courier.exchanges
+    service.unasked = unasked
+    driver.write([0.0, 0.0, PUSH_N])
+    end_s = time.monotonic() + 30.0
+    while courier.exchanges == exchanges or service.unasked:
+        assert time.monotonic() < end_s
+        time.sleep(0.001)
+    with service.lock:
+        pass  # all have been sent
+    asyncio.run_coroutine_threadsafe(asyncio.sleep(0.05), courier._loop).result(30.0)  # and have come
+
+
+@pytest.mark.parametrize("end", [Inverse3.disable, Inverse3.close], ids=["disable", "close"])
+def test_a_state_that_came_unasked_is_no_answer_to_the_zero(
+    service: FakeService, monkeypatch: pytest.MonkeyPatch, end: Callable[[Inverse3], None]
+) -> None:
+    driver = pressing(service)
+    monkeypatch.setattr(haply_driver, "URGENT_S", 0.5)
+    press_and_hear_unasked(service, driver, 1)
+    obey, goes_on = service._obey, threading.Event()
+
+    def late(said: dict[str, Any]) -> None:
+        goes_on.wait(10.0)
+        obey(said)
+
+    monkeypatch.setattr(service, "_obey", late)
+    end(driver)
+    assert service.cursor.force_n == [0.0, 0.0, PUSH_N]
+    assert "did not answer" in driver.force_left
+    goes_on.set()
+    driver.close()
+
+
+def test_states_that_came_unasked_make_no_later_one_older(service: FakeService) -> None:
+    driver = pressing(service)
+    for _ in range(3):
+        press_and_hear_unasked(service, driver, 2)
+    driver.read()
+    press_and_hear_unasked(service, driver, 0)
+    assert driver.read().position_m == pytest.approx(service.cursor.x_m, abs=0.0, rel=0.0)
     driver.close()
 
 

@@ -22,7 +22,8 @@ class MoteusController(Controller):
 
     Attributes:
         mode, fault: as its registers.
-        home_state: 0 to 2.
+        home_state: 0 to 2, by which another encoder has told it where it is.
+        wakes_at_home: whether such an encoder does so when it is switched on.
         preparing: frames for which it prepares before it follows a torque.
         voltage_v: of its supply; below 10 V it gives up.
         commands: every register that the last command has set.
@@ -32,7 +33,8 @@ class MoteusController(Controller):
         super().__init__(address, shaft)
         self.mode: int = Mode.STOPPED
         self.fault = 0
-        self.home_state = 1
+        self.home_state = 2
+        self.wakes_at_home = False
         self.milliseconds = 1000.0
         self.preparing = 0
         self.voltage_v = 24.0
@@ -48,8 +50,9 @@ class MoteusController(Controller):
 
     def restart(self) -> None:
         """Switch it off and on: it has stopped, and has forgotten how often its shaft has turned."""
-        self.mode, self.fault, self.home_state, self.milliseconds = Mode.STOPPED, 0, 1, 0.0
-        self._zero = math.floor(self.shaft.turns)
+        self.mode, self.fault, self.milliseconds = Mode.STOPPED, 0, 0.0
+        self.home_state = 2 if self.wakes_at_home else 1
+        self._zero = math.floor(self.shaft.turns + 0.5)
 
     def break_down(self, fault: int) -> None:
         self.mode, self.fault = Mode.FAULT, fault

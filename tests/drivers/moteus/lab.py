@@ -19,8 +19,13 @@ def axes(count: int, **keys: Any) -> list[dict[str, Any]]:
 
 
 def options(channel: str, count: int = 1, **keys: Any) -> MoteusOptions:
-    """As a configuration gives them; the shaft counts from the middle and the sign is known unless said otherwise."""
-    made = {"channel": channel, "axes": axes(count, homing="absolute"), "sign_checked": True, **keys}
+    """As a configuration gives them; the shaft knows its place in less than a turn, and the sign is known."""
+    made = {
+        "channel": channel,
+        "axes": axes(count, homing="absolute", lowest_m=-0.03, highest_m=0.03),
+        "sign_checked": True,
+        **keys,
+    }
     return MoteusOptions.model_validate(made)
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverStateError
+from hapticd.errors import ConfigError, DeviceFaultError, DeviceProtocolError, DriverStateError
+from hapticd_drivers.moteus import crew as moteus_crew
 from hapticd_drivers.motors import crew
+from hapticd_drivers.motors.drum import Drum
+from hapticd_drivers.motors.options import DrumOptions
 from hapticd_drivers.rig import motion
-from tests.drivers.moteus.controller import COUNTS_PER_TURN
+from tests.drivers.moteus.controller import MoteusController
 from tests.drivers.moteus.lab import Lab, axes
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
@@ -23,9 +24,15 @@ from tests.drivers.motors.wire import Frames
 BOUND_N = 0.5
 
 
+def be_patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy computer is no fault."""
+    monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
+    monkeypatch.setattr(moteus_crew, "AT_ONCE_S", 0.25)
+
+
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
-    monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
+    be_patient(monkeypatch)
     with Lab("fdcanusb", tmp_path, 1, monkeypatch) as made:
         made.first.shaft.x_m = -0.035
         move_by_the_shaft(made.first.shaft, monkeypatch)
@@ -103,32 +110,181 @@ def lose_homes(bench: Lab, monkeypatch: pytest.MonkeyPatch, most: int) -> list[b
 
 def test_a_home_that_was_lost_on_the_way_is_told_again(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     """That it has a home the controller says all the time: it has an older one."""
-    bench.first.home_state = 2
     with bench.driver(axes=axes(1)) as driver:
         motors = driver._opened()
+        (motor,) = motors.motors
+        motors.set_home([motor.turns])
         lost = lose_homes(bench, monkeypatch, 1)
-        assert abs(motors.motors[0].turns) > 0.1
-        motors.set_home([motors.motors[0].turns])
+        motors.set_home([motor.turns])
         assert len(lost) == 1
-        assert motors.motors[0].turns == pytest.approx(0.0, abs=1e-3)
+        assert motor.turns == pytest.approx(motor.home_turns, abs=1e-4)
 
 
-@pytest.mark.parametrize("part_of_a_count", [0.0, 0.3, 0.7])
-def test_a_home_that_is_where_it_was_is_taken(bench: Lab, part_of_a_count: float) -> None:
-    """As in a second calibration; places come in whole counts of the encoder."""
-    bench.first.shaft.x_m = (-9000 + part_of_a_count) / COUNTS_PER_TURN * 2.0 * math.pi * RADIUS_M
+def test_a_home_that_is_where_it_was_is_taken(bench: Lab) -> None:
+    """As in a second calibration."""
     with bench.driver(axes=axes(1)) as driver:
         motors = driver._opened()
+        (motor,) = motors.motors
         for _ in range(3):
-            motors.set_home([motors.motors[0].turns])
-            assert motors.motors[0].turns == pytest.approx(0.0, abs=1.0 / COUNTS_PER_TURN)
+            motors.set_home([motor.turns])
+            assert motor.turns == pytest.approx(motor.home_turns, abs=1e-4)
+
+
+@pytest.mark.parametrize("obeyed", [False, True], ids=["it was not heard", "its answer was lost"])
+def test_a_home_that_is_told_again_is_where_it_was_and_not_where_the_handle_is_by_then(
+    bench: Lab, monkeypatch: pytest.MonkeyPatch, obeyed: bool
+) -> None:
+    hear, lost = bench.first.hear, list[float]()
+
+    def hear_late(identifier: int, data: bytes) -> Frames:
+        if lost or b"\x0d\xb1\x02" in data:
+            lost.append(bench.first.shaft.x_m)
+            if len(lost) <= 2:
+                if obeyed:
+                    hear(identifier, data)
+                bench.first.shaft.x_m += 0.005
+                return []
+        answers: Frames = hear(identifier, data)
+        return answers
+
+    with opened(bench, homing="here") as driver:
+        monkeypatch.setattr(bench.first, "hear", hear_late)
+        driver.calibrate()
+        driver.read()
+        assert driver.read().position_m[0] == pytest.approx(bench.first.shaft.x_m - lost[0], abs=2e-4)
+
+
+def test_a_controller_that_restarts_while_it_is_told_its_home_is_refused(
+    bench: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It counts from elsewhere by then, and would take that for the old count."""
+    hear, lost = bench.first.hear, list[bytes]()
+
+    def restart(identifier: int, data: bytes) -> Frames:
+        if b"\x0d\xb1\x02" in data and not lost:
+            lost.append(data)
+            bench.first.restart()
+            return []
+        answers: Frames = hear(identifier, data)
+        return answers
+
+    with opened(bench, homing="here") as driver:
+        monkeypatch.setattr(bench.first, "hear", restart)
+        with pytest.raises(DeviceFaultError, match="switched off and on"):
+            driver.calibrate()
+        with pytest.raises(DriverStateError, match="not known where the handle is"):
+            driver.enable()
+
+
+def test_a_home_that_a_controller_has_from_elsewhere_is_not_taken_for_one_that_it_was_told(bench: Lab) -> None:
+    """Such as from motor_position.output.reference_source: it has that as soon as it is switched on."""
+    bench.first.wakes_at_home = True
+    bench.first.restart()
+    with bench.driver(axes=axes(1, homing="here")) as driver:
+        driver._state_wait_s = PATIENCE_S
+        assert bench.first.home_state == 2
+        assert not driver.read().calibrated
+        with pytest.raises(DriverStateError, match="not known where the handle is"):
+            driver.enable()
+        driver.calibrate()
+        driver.enable()
+        driver.disable()
+        bench.first.restart()
+        for _ in range(3):
+            driver.read()
+        assert not driver.read().calibrated
+        with pytest.raises(DriverStateError, match="not known where the handle is"):
+            driver.enable()
+
+
+@pytest.mark.parametrize("radius_m", [1.0, RADIUS_M, 1e-3, 1e-4])
+def test_where_a_told_home_is_counted_no_controller_gets_to_by_itself(radius_m: float) -> None:
+    """It wakes within half a turn of 0, and goes through the whole travel."""
+    (table,) = axes(1, radius_m=radius_m, home_m=-0.05)
+    drum = Drum(DrumOptions.model_validate(table))
+    motor = moteus_crew.MoteusMotor(drum)
+    motor.home_state = 2
+    most_turns = drum.options.most_turns
+    for motor.turns in (0.0, 0.5 + most_turns, -0.5 - most_turns):
+        assert motor.home_turns is None
+    for mark_turns in (motor.mark_turns, -motor.mark_turns):
+        for motor.turns in (mark_turns - 1.1 * most_turns, mark_turns, mark_turns + 1.1 * most_turns):
+            assert motor.home_turns == mark_turns
+
+
+SHORT = {"homing": "absolute", "lowest_m": -0.03, "highest_m": 0.03}
+"""Less than half a turn to either side."""
+
+
+@pytest.mark.parametrize(
+    ("home_state", "zero", "problem"),
+    [
+        (0, 0.0, "does not know where its shaft is"),
+        (1, 0.0, ""),
+        (2, 0.0, ""),
+        (2, 64.0, "counts from a home that it was told: switch it off and on"),
+    ],
+)
+def test_a_controller_that_does_not_know_its_place_is_refused_as_absolute(
+    bench: Lab, home_state: int, zero: float, problem: str
+) -> None:
+    bench.first.home_state = home_state
+    bench.first._zero = zero
+    driver = bench.driver(axes=axes(1, **SHORT))
+    if not problem:
+        driver.open()
+        driver.enable()
+    else:
+        with pytest.raises(ConfigError, match=rf'device.options.axes\[0\].homing = "absolute": controller 1 {problem}'):
+            driver.open()
+
+
+def test_one_that_knows_no_place_after_a_restart_is_refused_when_it_is_to_be_armed(bench: Lab) -> None:
+    with bench.driver() as driver:
+        driver._state_wait_s = PATIENCE_S
+        bench.first.restart()
+        bench.first.home_state = 0
+        driver.read()
+        driver.read()
+        with pytest.raises(DeviceFaultError, match="does not know where its shaft is"):
+            driver.enable()
+        assert bench.first.torque_n_m == 0.0
+
+
+def test_an_axis_that_is_told_its_home_beside_one_that_knows_it_can_be_armed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    be_patient(monkeypatch)
+    with Lab("fdcanusb", tmp_path, 2, monkeypatch) as bench:
+        for one in bench.controllers:
+            assert isinstance(one, MoteusController)
+            one.home_state = 1
+        shaft = bench.controllers[1].shaft
+        shaft.x_m = 0.02
+        move_by_the_shaft(bench.first.shaft, monkeypatch)
+        knows, told = axes(2, lowest_m=-0.03, highest_m=0.03)
+        tables = [{**knows, "homing": "absolute"}, {**told, "homing": "here"}]
+        with bench.driver(axes=tables) as driver:
+            driver._state_wait_s = PATIENCE_S
+            driver.calibrate()
+            home_m = shaft.x_m
+            for _ in range(2):
+                driver.enable()
+                driver.write([0.0, 0.0])
+                driver.read()
+                assert driver.read().position_m[1] == pytest.approx(shaft.x_m - home_m, abs=2e-4)
+                driver.disable()
+                driver.read()
+                assert driver.read().calibrated
+        with bench.driver(axes=tables) as again:
+            again.enable()
 
 
 def test_a_home_that_is_not_taken_leaves_none(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     driver = opened(bench, homing="here")
     driver.calibrate()
     bench.first.shaft.x_m += 0.01  # else its home could be where it was, which is no other
-    monkeypatch.setattr(crew, "GREETING_PATIENCE_S", 0.3)
+    monkeypatch.setattr(moteus_crew, "GREETING_PATIENCE_S", 0.3)
     lose_homes(bench, monkeypatch, 1000)
     with pytest.raises(DeviceProtocolError, match="has not taken its home"):
         driver.calibrate()
@@ -229,9 +385,15 @@ def test_a_motor_without_supply_does_not_pass(bench: Lab) -> None:
     driver.close()
 
 
-def test_it_ends_without_force_when_it_is_called_off(bench: Lab) -> None:
+def test_it_ends_without_force_when_it_is_called_off(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     driver = opened(bench)
-    threading.Timer(0.5, driver.call_off).start()
+    find_stop = motion.find_stop
+
+    def find(drive: motion.Drive, towards: float) -> int:
+        driver.call_off()
+        return find_stop(drive, towards)
+
+    monkeypatch.setattr(motion, "find_stop", find)
     with pytest.raises(DriverStateError, match="called off"):
         driver.calibrate()
     assert bench.first.torque_n_m == 0.0

@@ -29,7 +29,7 @@ sign_checked = true
 id = 1
 radius_m = {RADIUS_M}
 max_torque_n_m = {MOST_N_M}
-lowest_m = -0.05
-highest_m = 0.05
+lowest_m = -0.03
+highest_m = 0.03
 homing = "absolute"
 """

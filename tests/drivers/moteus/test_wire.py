@@ -78,7 +78,7 @@ def test_the_other_commands_are_too(turns: float) -> None:
     assert padded(maker().make_query().data) == registers.QUERY
     said = parse_registers(registers.here_is(turns))
     assert said.command == parse_registers(maker().make_set_output_exact(position=turns).data).command
-    assert said.query == [(Register.HOME_STATE, mp.INT8)]
+    assert said.query == parse_registers(registers.QUERY).query
     identity = dict(parse_registers(registers.IDENTITY).query)
     words = (Register.SERIAL_NUMBER1, Register.SERIAL_NUMBER2, Register.SERIAL_NUMBER3)
     assert identity == dict.fromkeys((Register.FIRMWARE_VERSION, *words), mp.INT32)

@@ -30,5 +30,6 @@ class Lab(MotorLab):
 
     def made(self, period_s: float, **keys: Any) -> Odrive:
         common = {"channel": self.channel, "sign_checked": True, "watchdog_ms": 20.0}
-        made = {**common, "axes": axes(len(self.controllers), homing="absolute"), **keys}
+        tables = axes(len(self.controllers), homing="absolute", lowest_m=-0.03, highest_m=0.03)
+        made = {**common, "axes": tables, **keys}
         return Odrive(OdriveOptions.model_validate(made), period_s)

@@ -8,26 +8,31 @@ from typing import Any
 
 import pytest
 
-from hapticd.errors import DeviceFaultError, DriverStateError
-from hapticd_drivers.motors import crew
+from hapticd.errors import DeviceFaultError, DeviceTimeoutError, DriverStateError
+from hapticd_drivers.motors import crew, mover
 from hapticd_drivers.motors.driver import MotorDriver
 from hapticd_drivers.odrive import crew as odrive_crew
+from hapticd_drivers.rig import motion
 from tests.drivers.motors.bench import PATIENCE_S
 from tests.drivers.motors.lab import RADIUS_M
+from tests.drivers.odrive.controller import OdriveController
 from tests.drivers.odrive.lab import Lab, axes
 
 BOUND_N = 0.5
 
 
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
+@pytest.fixture(params=[1])
+def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
     monkeypatch.setattr(crew, "URGENT_PATIENCE_S", PATIENCE_S)
+    monkeypatch.setattr(mover, "RESTARTED_S", 0.5)
     monkeypatch.setattr(odrive_crew, "LOOKED_S", PATIENCE_S)
     monkeypatch.setattr(odrive_crew, "OBEYS_S", PATIENCE_S)
     monkeypatch.setattr(odrive_crew, "HEARTBEAT_S", PATIENCE_S)
-    with Lab("slcan", tmp_path, 1, monkeypatch) as made:
+    with Lab("slcan", tmp_path, request.param, monkeypatch) as made:
         made.first.shaft.x_m = -0.035
-        made.first.watchdog_s = 0.2
+        for one in made.controllers:
+            assert isinstance(one, OdriveController)
+            one.watchdog_s = 0.2
         made.bench.idle_passes = True
         yield made
 
@@ -72,6 +77,42 @@ def lose_power(bench: Lab, driver: MotorDriver[Any]) -> None:
         driver.read()
     driver._state_wait_s = PATIENCE_S
     bench.first.deaf = False
+
+
+@pytest.mark.parametrize("bench", [2], indirect=True)
+def test_a_calibration_in_which_an_odrive_falls_silent_does_not_pass(
+    bench: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has its home already while the other axis moves, and counts from elsewhere when it is heard again."""
+    found, last = axes(2)
+    driver = bench.driver(axes=[{**found, "homing": "here"}, {**last, "homing": "absolute"}], watchdog_ms=200.0)
+    driver.open()
+    check_sign, await_states = motion.check_sign, driver._opened().await_states
+
+    def lose_power(drive: motion.Drive) -> None:
+        with bench.bench.lock:
+            bench.first.deaf = drive.axis == 1
+        check_sign(drive)
+
+    def come_back(timeout_s: float) -> bool:
+        fresh = await_states(timeout_s)
+        if not fresh and bench.first.deaf:
+            with bench.bench.lock:
+                bench.first.restart()
+                bench.first.turns = 0.0
+                bench.first.deaf = False
+        return fresh
+
+    monkeypatch.setattr(motion, "check_sign", lose_power)
+    monkeypatch.setattr(driver._opened(), "await_states", come_back)
+    with pytest.raises(DeviceTimeoutError, match="during the calibration"):
+        driver.calibrate()
+    assert not bench.first.deaf
+    for one in bench.controllers:
+        assert one.torque_n_m == 0.0
+    with pytest.raises(DriverStateError, match="not known where the handle is"):
+        driver.enable()
+    driver.close()
 
 
 def test_an_odrive_without_the_watchdog_that_is_declared_does_not_pass(bench: Lab) -> None:

@@ -121,6 +121,8 @@ def test_slow_heartbeats_are_refused_with_what_to_set(bench: Lab, monkeypatch: p
     ("keys", "text"),
     [
         ({"axes": [*axes(1), *axes(1)]}, "another axis has this address"),
+        ({"axes": axes(1, homing="absolute")}, "up to 0.8 times from home_m: take another homing"),
+        ({"axes": axes(1, homing="absolute", lowest_m=0.0, highest_m=0.04)}, "up to 0.64 times from home_m"),
         ({"axes": axes(1, lowest_m=0.1)}, "must be below highest_m"),
         ({"axes": axes(1, id=64)}, "0 to 63"),
         ({"watchdog_ms": 3.0}, "at least 4"),
