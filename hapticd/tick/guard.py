@@ -25,6 +25,9 @@ BLIND_RAMP_S = 0.01
 Without a position there is no wall, only a constant push; at 12 N and 0.25 kg this bounds it to about 0.25 m/s.
 """
 
+MOST_LONGER = 10.0
+"""So many ramps may a transition last whose contact holds more than the limit against another one."""
+
 
 class BlendFields:
     """The scalar fields that a blend of one contact's force keeps, `start_blend` to `blended`."""
@@ -41,7 +44,7 @@ def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: in
     """Begin a transition of one contact, from the force that is applied inside the wall.
 
     One that holds more than the limit, against another that does, may go on to as much and takes so much longer: what
-    it lets go is the other's force on the device.
+    it lets go is the other's force on the device. It is over within `MOST_LONGER` ramps, since the other may go first.
 
     Args:
         state: an object with the fields of `BlendFields`.
@@ -53,7 +56,7 @@ def start_blend(state: Any, from_n: float, x_m: float, limit_n: float, ticks: in
     state.blending = True
     state.blend_tick = -1.0
     held_n = abs(from_n)
-    longer = held_n / limit_n if 0.0 < limit_n < held_n else 1.0
+    longer = min(held_n / limit_n, MOST_LONGER) if 0.0 < limit_n < held_n else 1.0
     state.blend_ticks = longer * ticks
     state.blend_from_n = from_n
     state.blend_from_x_m = x_m

@@ -180,6 +180,8 @@ class ControlTick:
             if self.just_armed:
                 self.just_armed = False
                 if periods > 1.0:  # enabling the device took that, without force
+                    for port in self.ports:
+                        port.miss_time(passed_s - self.period_s)
                     passed_s, periods = self.period_s, 1.0
         seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
@@ -375,9 +377,14 @@ class ControlTick:
         sight = self.sight
         if self.guard.mode is Mode.ARMED or sight.is_fault(calibrated):
             self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE if calibrated else _LOST)
+        seen = not sight.blind or sight.gain > 0.0
         sight.let_out(self.force_n, calibrated, passed_s)
         if sight.gain == 0.0:
             self.guard.drop()
+            if seen:
+                self._stand()
+        for port in self.ports:
+            port.pass_time(passed_s)
         for axis in self._axes:
             self.requested_n[axis] = 0.0
         return self.force_n

@@ -15,7 +15,7 @@ class HeardPort(Port):
     """Keeps every update that it was given, and how old it was."""
 
     def __init__(self, limits: PortLimits, axes: int = 1) -> None:
-        super().__init__(limits, axes)
+        super().__init__(limits, axes, 1e-3)
         self.heard: list[Update] = []
         self.ages_s: list[float] = []
 

@@ -241,7 +241,9 @@ def test_a_blend_that_begins_late_does_not_count_what_passed_before_and_one_that
     assert state.blend_tick == -1.0
 
 
-@pytest.mark.parametrize(("limit_n", "longer"), [(12.0, 2.0), (24.0, 1.0), (30.0, 1.0), (0.0, 1.0), (math.inf, 1.0)])
+@pytest.mark.parametrize(
+    ("limit_n", "longer"), [(12.0, 2.0), (24.0, 1.0), (30.0, 1.0), (1.0, 10.0), (0.0, 1.0), (math.inf, 1.0)]
+)
 def test_a_blend_from_more_than_the_limit_is_so_much_longer_and_goes_on_to_as_much(
     limit_n: float, longer: float
 ) -> None:

@@ -73,7 +73,7 @@ class Coupling(OnePort):
         super().forget()
         self._said_motion.forget()
 
-    def _hear(self, update: Update) -> bool:
+    def _hear(self, update: Update, age_s: float) -> bool:
         said = update.said
         if not said & POSITION:
             return False
@@ -81,7 +81,7 @@ class Coupling(OnePort):
         placed, sped = self._said_motion.hear(update.position_ns, speed_ns)
         if placed or sped:
             velocity_m_per_s = None if speed_ns is None else update.velocity_m_per_s
-            self.follower.aim(update.position_m if placed else None, velocity_m_per_s)
+            self.follower.aim(update.position_m if placed else None, velocity_m_per_s, age_s + self._period_s)
         self._asked.hear(update)
         self._aim()
         return True
@@ -177,9 +177,9 @@ class Coupling(OnePort):
         if self._left_s > 0.0:
             self._left_s -= passed_s
             ramp_s = max(ramp_s, self._come_in_s())
-        step = passed_s / ramp_s if passed_s < ramp_s else 1.0
-        self.stiffness.go_on(step)
-        self.damping.go_on(step)
+        step, first = self._steps(passed_s, ramp_s)
+        self.stiffness.go_on(step, first)
+        self.damping.go_on(step, first)
 
     def _come_in_s(self) -> float:
         said = self.limits.come_in_s

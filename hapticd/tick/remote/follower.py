@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, sqrt
+from math import exp, inf, sqrt
 
 MOST_M = 1e7
 """No target is farther away than any device can be [m]."""
@@ -42,6 +42,7 @@ class Follower:
         "_decay",
         "_dt_s",
         "_goal_m_per_s",
+        "_since_s",
         "at_m",
         "goal_m",
         "hold_s",
@@ -63,6 +64,7 @@ class Follower:
         self._goal_m_per_s = [0.0] * axes
         self._ahead_s = 0.0
         self._dt_s = 0.0
+        self._since_s = inf
         self._decay = 1.0
 
     def begin(self, position_m: Sequence[float], velocity_m_per_s: Sequence[float]) -> None:
@@ -74,12 +76,19 @@ class Follower:
             self.moved_m[axis] = 0.0
         self.rests = False
 
-    def aim(self, position_m: Sequence[float] | None, velocity_m_per_s: Sequence[float] | None = None) -> None:
+    def aim(
+        self,
+        position_m: Sequence[float] | None,
+        velocity_m_per_s: Sequence[float] | None = None,
+        since_s: float = inf,
+    ) -> None:
         """Go to where a client says that the target is now, and on with its velocity.
 
         Args:
             position_m: one element an axis, whatever it is beyond; None: where it has come to by what was said [m].
             velocity_m_per_s: the same; None: it stands as far as is known [m/s].
+            since_s: how long ago that will be after the next move, which may take longer: a late tick, or slow samples
+                [s].
         """
         share = 0.0
         if velocity_m_per_s is not None:
@@ -89,7 +98,12 @@ class Follower:
                 self.goal_m[axis] = min(max(position_m[axis], -MOST_M), MOST_M)
             self._goal_m_per_s[axis] = 0.0 if velocity_m_per_s is None else share * velocity_m_per_s[axis]
         self._ahead_s = 0.0
+        self._since_s = since_s
         self.rests = False
+
+    def wait(self, passed_s: float) -> None:
+        """Know that time has passed without a move [s]."""
+        self._since_s += passed_s
 
     def move(self, dt_s: float) -> None:
         """Go on by a tick.
@@ -102,7 +116,8 @@ class Follower:
             self._decay = exp(-HASTE_PER_S * dt_s)
         keep = self._decay * self._decay
         lost = (1.0 - self._decay) * (1.0 - self._decay)
-        ahead_s = min(dt_s, max(0.0, self.hold_s - self._ahead_s))
+        ahead_s = min(dt_s, self._since_s, max(0.0, self.hold_s - self._ahead_s))
+        self._since_s = inf
         self._ahead_s += ahead_s
         goal_share = ahead_s / dt_s
         most = self.max_speed_m_per_s

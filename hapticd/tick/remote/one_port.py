@@ -56,10 +56,11 @@ class OnePort(Port):
 
     __slots__ = (
         "_begun",
+        "_comes_in",
         "_from_m",
+        "_limit_begins",
         "_most_change_n",
         "_outside_s",
-        "_period_s",
         "_sample_s",
         "_waits",
         "asleep",
@@ -78,7 +79,7 @@ class OnePort(Port):
     def __init__(self, limits: PortLimits, site: PortSite) -> None:
         self.motion = site.motion
         axes = len(site.motion.position_m)
-        super().__init__(limits, axes)
+        super().__init__(limits, axes, site.period_s)
         self.books = PortBooks()
         self.channels = [PortAxis(self.books, axis, site.make_law, site.resolution_m) for axis in range(axes)]
         self.ramp_s = site.ramp_s
@@ -87,8 +88,9 @@ class OnePort(Port):
         self.weight = self.scale = 0.0
         self.asleep = True
         self.leaving = False
-        self._period_s = site.period_s
         self._begun = False  # since its weight was 0
+        self._comes_in = False  # in this tick, for the first time
+        self._limit_begins = False  # to move, with the next tick
         self._waits = False  # it has gone on since the last sample
         self._sample_s = 0.0  # of a sample that no law has been shown yet
         self._outside_s = self._most_change_n = 0.0
@@ -132,6 +134,7 @@ class OnePort(Port):
         """Go on under other limits; that of force moves there by a ramp, and at once where nothing is in force."""
         self.limits = limits
         self._most_change_n = limits.max_force_n - self.most_n
+        self._limit_begins = True
         if not self._begun:
             self._take_limit()
 
@@ -276,10 +279,11 @@ class OnePort(Port):
         for axis, channel in enumerate(self.channels):
             self.impulse_n_s[axis] += (channel.applied_n if driven else channel.own_n) * passed_s
         self.pass_time(passed_s)
-        step = passed_s / self.ramp_s if passed_s < self.ramp_s else 1.0
+        step, first = self._steps(passed_s, self.ramp_s)
         if self.state is _HELD:
             if self._begun:  # a ramp begins with the first sample that there is a force for
-                self.weight = min(1.0, self.weight + step)
+                self.weight = min(1.0, self.weight + (first if self._comes_in else step))
+                self._comes_in = False
         elif self.weight > step:
             self.weight -= step
         else:
@@ -288,8 +292,14 @@ class OnePort(Port):
             self._take_limit()
         goal_n = self.limits.max_force_n
         if self.most_n != goal_n:
-            most_n = self.most_n + self._most_change_n * step
+            most_n = self.most_n + self._most_change_n * (first if self._limit_begins else step)
             self.most_n = min(goal_n, most_n) if self._most_change_n > 0.0 else max(goal_n, most_n)
+        self._limit_begins = False
+
+    def _steps(self, passed_s: float, ramp_s: float) -> tuple[float, float]:
+        """How far a ramp comes in this tick, as a share: one that is under way, and one that begins with it."""
+        first_s = min(passed_s, self._period_s)
+        return min(1.0, passed_s / ramp_s), min(1.0, first_s / ramp_s)
 
     def _take_limit(self) -> None:
         """Have the limit of force where it goes: nothing is in force that could step."""
@@ -320,7 +330,7 @@ class OnePort(Port):
         position_m = self.motion.position_m
         moved_s = max(passed_s, LEAST_S) if self._waits else dt_s
         if not self._begun:
-            self._begun = True
+            self._begun = self._comes_in = True
             moved_s = 0.0
             self._begin()
             self._from_m[:] = position_m

@@ -21,6 +21,7 @@ class Port:
     Args:
         limits: what it may do.
         axes: of the device.
+        period_s: nominal time between ticks [s].
 
     Attributes:
         name: who it is, through a reload too.
@@ -38,6 +39,8 @@ class Port:
 
     __slots__ = (
         "_back_s",
+        "_new",
+        "_period_s",
         "_silent",
         "_stale_s",
         "_told",
@@ -53,8 +56,10 @@ class Port:
         "target_m",
     )
 
-    def __init__(self, limits: PortLimits, axes: int) -> None:
+    def __init__(self, limits: PortLimits, axes: int, period_s: float) -> None:
         self.limits = limits
+        self._period_s = period_s
+        self._new = False  # what was heard last has come since the last tick
         self.name = limits.name
         self.kind = limits.kind
         self.state = PortState.IDLE
@@ -95,11 +100,16 @@ class Port:
             return
         if age_s > self.limits.hold_s:
             return
-        if self._hear(update):  # else it holds nothing: what another client has said before grows old
+        if self._hear(update, age_s):  # else it holds nothing: what another client has said before grows old
             self.age_s = age_s
+            self._new = True
             self.seq = update.seq
             if self.state is not _HELD:
                 self._become(_HELD)
+
+    def stand(self) -> None:
+        """Be without force and without a client, where it is; an event tells of one that was in force."""
+        raise NotImplementedError
 
     def lose_client(self) -> None:
         """Know nothing of a client until it says something anew, and tell of one that was in force."""
@@ -113,19 +123,34 @@ class Port:
         self.seq = -1
 
     def pass_time(self, passed_s: float) -> None:
-        """Grow older, and let go what is too old.
+        """Grow older, and let go what is too old. What has come since the last tick is older by a period at most.
 
         Args:
             passed_s: time since the last tick on this computer's clock [s].
         """
-        self.age_s += passed_s
+        self._grow_old(min(passed_s, self._period_s) if self._new else passed_s)
+        self._new = False
         self._keep_quiet(passed_s)
         if self.state is _HELD and (self.age_s > self.limits.hold_s or self._hangs(passed_s)):
             self._become(_STALE)
 
-    def _hear(self, update: Update) -> bool:
-        """Take in what this kind of port goes by; False when there is nothing of it yet."""
+    def miss_time(self, passed_s: float) -> None:
+        """Grow older by time that no tick counts [s]; what has come since the last tick came after it.
+
+        One that is too old by then comes in with no force and lets none out.
+        """
+        if not self._new:
+            self._grow_old(passed_s)
+            if self.state is _HELD and self.age_s > self.limits.hold_s:
+                self.stand()
+
+    def _hear(self, update: Update, age_s: float) -> bool:
+        """Take in what this kind of port goes by, said some time ago [s]; False when there is nothing of it yet."""
         raise NotImplementedError
+
+    def _grow_old(self, passed_s: float) -> None:
+        """Have what is known of the client be so much older [s]."""
+        self.age_s += passed_s
 
     def _hangs(self, passed_s: float) -> bool:
         """Whether the client is to be believed no more though it speaks."""

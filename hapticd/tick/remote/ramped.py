@@ -19,11 +19,12 @@ class Ramped:
         goal: where it goes, or is.
     """
 
-    __slots__ = ("_from", "_share", "goal")
+    __slots__ = ("_begins", "_from", "_share", "goal")
 
     def __init__(self, value: float) -> None:
         self.goal = self._from = value
         self._share = 1.0
+        self._begins = False
 
     @property
     def now(self) -> float:
@@ -41,6 +42,7 @@ class Ramped:
         self._from = self.force(s, limit) / s if s > 0.0 else self.now
         self.goal = goal
         self._share = 0.0
+        self._begins = True
 
     def begin(self, share: float) -> None:
         """Come to where it goes from nothing.
@@ -50,10 +52,17 @@ class Ramped:
         """
         self._from = 0.0
         self._share = share
+        self._begins = True
 
-    def go_on(self, step: float) -> None:
-        """Take a step of the ramp, a share of the whole."""
-        self._share = min(1.0, self._share + step)
+    def go_on(self, step: float, first: float) -> None:
+        """Take a step of the ramp.
+
+        Args:
+            step: a share of the whole.
+            first: the same of one that has just begun: what passed of a late tick before is no part of it.
+        """
+        self._share = min(1.0, self._share + (first if self._begins else step))
+        self._begins = False
 
     def force(self, s: float, limit: float) -> float:
         """The force at s."""

@@ -30,6 +30,7 @@ class RemoteObject(Port):
     Args:
         limits: what it may do.
         solid: the object, as compiled.
+        period_s: nominal time between ticks [s].
 
     Attributes:
         contact: the object's contact, from when that is in a scene.
@@ -40,6 +41,7 @@ class RemoteObject(Port):
     __slots__ = (
         "_asked",
         "_damping",
+        "_ramp_begins",
         "_said_motion",
         "_said_turning",
         "_stiffness",
@@ -50,8 +52,10 @@ class RemoteObject(Port):
 
     contact: RemoteContact
 
-    def __init__(self, limits: PortLimits, solid: Solid) -> None:
-        super().__init__(limits, 3)
+    def __init__(self, limits: PortLimits, solid: Solid, period_s: float) -> None:
+        super().__init__(limits, 3, period_s)
+        self._stiffness = self._damping = 0.0
+        self._ramp_begins = False
         first = solid.configs[0]
         self.follower = Follower(3, limits.max_speed_m_per_s, limits.hold_s)
         self.turning = Turning(first.orientation, _max_turning(limits, solid), limits.hold_s)
@@ -120,8 +124,17 @@ class RemoteObject(Port):
         self.turning.move(dt_s)
         return Pose.of(self.follower.at_m, self.turning.now)
 
-    def towards(self, step: float) -> tuple[float, float]:
-        """Stiffness and damping of its surface after a step of their ramps, a share of the whole."""
+    def towards(self, passed_s: float, ramp_s: float) -> tuple[float, float]:
+        """Stiffness and damping of its surface after a step of their ramps.
+
+        Args:
+            passed_s: time since the last one; what passed of it before they began counts a period at most [s].
+            ramp_s: duration of the whole [s].
+        """
+        if self._ramp_begins:
+            passed_s = min(passed_s, self._period_s)
+            self._ramp_begins = False
+        step = min(1.0, passed_s / ramp_s)
         solid = self.contact.solid
         first = solid.configs[0]
         most = (first.stiffness_n_per_m * step, abs(first.damping_n_s_per_m) * step)
@@ -130,7 +143,18 @@ class RemoteObject(Port):
             _towards(solid.damping_n_s_per_m, self._damping, most[1]),
         )
 
-    def _hear(self, update: Update) -> bool:
+    def _become(self, state: PortState) -> None:
+        super()._become(state)
+        if state is PortState.RELEASED:  # and it stops
+            self.follower.aim(None)
+            self.turning.aim(None, None)
+
+    def _grow_old(self, passed_s: float) -> None:
+        super()._grow_old(passed_s)
+        self.follower.wait(passed_s)
+        self.turning.follower.wait(passed_s)
+
+    def _hear(self, update: Update, age_s: float) -> bool:
         said = update.said
         self._asked.hear(update)
         self._aim(self.contact.solid)
@@ -138,18 +162,21 @@ class RemoteObject(Port):
         placed, sped = self._said_motion.hear(update.position_ns if said & POSITION else None, speed_ns)
         if placed or sped:
             velocity_m_per_s = None if speed_ns is None else update.velocity_m_per_s
-            self.follower.aim(update.position_m if placed else None, velocity_m_per_s)
+            self.follower.aim(update.position_m if placed else None, velocity_m_per_s, age_s)
         speed_ns = update.turning_ns if said & TURNING else None
         placed, sped = self._said_turning.hear(update.orientation_ns if said & ORIENTATION else None, speed_ns)
         if placed or sped:
             turning_rad_per_s = None if speed_ns is None else update.angular_velocity_rad_per_s
-            self.turning.aim(update.orientation if placed else None, turning_rad_per_s)
+            self.turning.aim(update.orientation if placed else None, turning_rad_per_s, age_s)
         return bool(said & (POSITION | VELOCITY | ORIENTATION | TURNING | STIFFNESS | DAMPING))
 
     def _aim(self, solid: Solid) -> None:
         """Have the surface go to what the client has asked for, within what the file says."""
         first = solid.configs[0]
-        self._stiffness, self._damping = self._asked.within(first.stiffness_n_per_m, first.damping_n_s_per_m)
+        goals = self._asked.within(first.stiffness_n_per_m, first.damping_n_s_per_m)
+        if goals != (self._stiffness, self._damping):
+            self._stiffness, self._damping = goals
+            self._ramp_begins = True
 
 
 class RemoteContact(SolidContact):
@@ -161,6 +188,7 @@ class RemoteContact(SolidContact):
         resolution_m: smallest step of the device's position [m].
         limits: what the client may do.
         ramp_s: duration of the ramps of stiffness and damping [s].
+        period_s: nominal time between ticks [s].
 
     Attributes:
         port: what the client says.
@@ -179,6 +207,7 @@ class RemoteContact(SolidContact):
         resolution_m: float,
         limits: PortLimits,
         ramp_s: float,
+        period_s: float,
     ) -> None:
         super().__init__(solid, make_law, resolution_m)
         self.carried_j = 0.0
@@ -187,7 +216,7 @@ class RemoteContact(SolidContact):
         self._held_along: Sequence[Vector] = ()  # where ticks had no sample: along what was held until this one
         self._way: Vector = (0.0, 0.0, 0.0)  # of the touched point, since the last sample
         self._waited_s = 0.0  # since then, in ticks without one
-        self.port = RemoteObject(limits, solid)
+        self.port = RemoteObject(limits, solid, period_s)
 
     def join(self) -> None:
         """Be in a scene. Only there it and its port know each other: in the loop no collector looks for circles."""
@@ -200,9 +229,9 @@ class RemoteContact(SolidContact):
         everywhere.reach_limit = inf
         return everywhere
 
-    def start(self, x: float, y: float, z: float) -> None:
+    def start(self, x: float, y: float, z: float, held: Proxy | None = None) -> None:
         """Have the device at a point of the world, at rest and without force; the object stops where it is."""
-        super().start(x, y, z)
+        super().start(x, y, z, held)
         self.port.stand()
         self.port.force_n[:] = (0.0, 0.0, 0.0)
         self._waited_s = 0.0
@@ -243,9 +272,8 @@ class RemoteContact(SolidContact):
         if self.leaving:
             return super().observe(at, velocity, way, dt_s)
         solid = self.solid
-        step = dt_s / self.ramp_s if dt_s < self.ramp_s else 1.0
         self._before_n_per_m = solid.stiffness_n_per_m
-        solid.stiffness_n_per_m, solid.damping_n_s_per_m = port.towards(step)
+        solid.stiffness_n_per_m, solid.damping_n_s_per_m = port.towards(dt_s, self.ramp_s)
         if port.rests:
             return super().observe(at, velocity, way, dt_s)
         proxy = solid.proxy

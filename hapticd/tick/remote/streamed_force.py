@@ -25,7 +25,7 @@ class StreamedForce(OnePort):
         site: where it is.
     """
 
-    __slots__ = ("_goal_n", "_now_n", "_same_s")
+    __slots__ = ("_goal_is_new", "_goal_n", "_now_n", "_same_s")
 
     def __init__(self, limits: PortLimits, site: PortSite) -> None:
         super().__init__(limits, site)
@@ -33,6 +33,7 @@ class StreamedForce(OnePort):
         self._goal_n = [0.0] * len(self.channels)
         self._now_n = [0.0] * len(self.channels)
         self._same_s = 0.0
+        self._goal_is_new = False
 
     def set_ramp(self, ramp_s: float) -> None:
         """Let go and come in within this time, and never more than `LET_GO_S`, from now on [s]."""
@@ -49,7 +50,8 @@ class StreamedForce(OnePort):
         super().forget()
         self._same_s = 0.0
 
-    def _hear(self, update: Update) -> bool:
+    def _hear(self, update: Update, age_s: float) -> bool:
+        del age_s
         if not update.said & FORCE:
             return False
         most = self.limits.max_force_n
@@ -62,6 +64,7 @@ class StreamedForce(OnePort):
             goal_n = [newton * (most / length) for newton in goal_n]
         if goal_n != self._goal_n or not any(goal_n):
             self._same_s = 0.0
+            self._goal_is_new = True
         self._goal_n = goal_n
         return not self._stands_too_long()
 
@@ -87,6 +90,9 @@ class StreamedForce(OnePort):
         super()._go_on(passed_s)
         if not self.channels[0].in_contact:
             return
+        if self._goal_is_new:  # what passed of a late tick before it was said is no part of the way to it
+            passed_s = min(passed_s, self._period_s)
+            self._goal_is_new = False
         step_n = self.limits.max_force_n * passed_s / BLEND_S
         way_n = [goal - now for goal, now in zip(self._goal_n, self._now_n, strict=True)]
         length_n = sqrt(sum([newton * newton for newton in way_n]))

@@ -37,18 +37,21 @@ class Turning:
         self.follower.begin((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self.follower.aim((0.0, 0.0, 0.0))
 
-    def aim(self, orientation: Sequence[float] | None, turning_rad_per_s: Sequence[float] | None) -> None:
+    def aim(
+        self, orientation: Sequence[float] | None, turning_rad_per_s: Sequence[float] | None, since_s: float = inf
+    ) -> None:
         """Turn to a client's orientation by the shorter way, and on with its angular velocity.
 
         Args:
             orientation: of any length; None, or of none: what it has come to by what was said.
             turning_rad_per_s: in the frame around; None: it stands as far as is known [rad/s].
+            since_s: how long ago that will be after the next move [s].
         """
         goal = (None if orientation is None else unit(orientation)) or _turned(self.follower.goal_m, self._from)
         self._from = self.now
         speed = list(self.follower.speed_m_per_s)
         self.follower.begin((0.0, 0.0, 0.0), speed)
-        self.follower.aim(_way(self.now, goal), turning_rad_per_s)
+        self.follower.aim(_way(self.now, goal), turning_rad_per_s, since_s)
 
     def move(self, dt_s: float) -> None:
         """Go on by a tick [s]."""

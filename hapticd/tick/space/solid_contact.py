@@ -116,10 +116,16 @@ class SolidContact:
         """What tells where the device may touch it, until its proxy is another."""
         return self.solid.proxy
 
-    def start(self, x: float, y: float, z: float) -> None:
-        """Have the device at a point of the world, at rest and without force [m]."""
+    def start(self, x: float, y: float, z: float, held: Proxy | None = None) -> None:
+        """Have the device at a point of the world, at rest and without force [m].
+
+        Where this one comes in the place of another one, by which the device is held, it is held on the same side.
+        """
         proxy = self.solid.proxy
         place(proxy, proxy.others, proxy.voxels, x, y, z)
+        if held is not None and proxy.touching:
+            stays = place_before(proxy, proxy.others, proxy.voxels, held, x, y, z)
+            (follow if stays else place)(proxy, proxy.others, proxy.voxels, x, y, z)
         for channel in self.channels:
             channel.rest()
         self._stand()
@@ -182,13 +188,7 @@ class SolidContact:
         self._restore(limit_n, gain)
         self.leaving = True
 
-    def observe(
-        self,
-        at: Vector,
-        velocity: Vector,
-        way: Vector,
-        dt_s: float,
-    ) -> bool:
+    def observe(self, at: Vector, velocity: Vector, way: Vector, dt_s: float) -> bool:
         """See a new sample; False when there is nothing to do: out of touch, and all that was held has been booked.
 
         Args:

@@ -14,6 +14,7 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.errors import ConfigError
 from hapticd.shapes.pose import Vector
 from hapticd.shapes.reach import Nearby
+from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Guard, Mode
@@ -28,9 +29,9 @@ from hapticd.tick.tick import ControlTick
 if TYPE_CHECKING:  # what a scene without remote objects never loads
     from hapticd.tick.remote.remote_object import RemoteContact
 
-MakeRemote = Callable[[Solid, Callable[[], RunningLaw], float, PortLimits, float], "RemoteContact"]
+MakeRemote = Callable[[Solid, Callable[[], RunningLaw], float, PortLimits, float, float], "RemoteContact"]
 """Makes the contact of an object that a client moves: the solid, a fresh law, the device's resolution [m], its limits,
-the duration of its ramps [s]."""
+the duration of its ramps and the nominal time between ticks [s]."""
 
 Limits = dict[str, PortLimits]
 """What clients may do with the objects that they move, by name."""
@@ -126,7 +127,7 @@ class SpaceTick(ControlTick):
                 x, y, z = self.motion.position_m
                 self.at_m = (x, y, z)
             for contact in switch.new:
-                contact.start(*self.at_m)
+                contact.start(*self.at_m, _held_by(self.solids, contact.solid))
             self._start_laws(switch.laws)
 
         yield from self._switch(scene, safety, make_law, start)
@@ -163,6 +164,8 @@ class SpaceTick(ControlTick):
             if self.just_armed:
                 self.just_armed = False
                 if periods > 1.0:  # enabling the device took that, without force
+                    for port in self.ports:
+                        port.miss_time(passed_s - self.period_s)
                     passed_s, periods = self.period_s, 1.0
         seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
@@ -284,7 +287,8 @@ class SpaceTick(ControlTick):
         if solid.remote:
             if self._make_remote is None:
                 raise ConfigError(f'"{solid.name}": this tick has no remote objects')
-            return self._make_remote(solid, make_law, self.info.resolution_m, limits[solid.name], self.ramp_s)
+            times_s = self.ramp_s, self.period_s
+            return self._make_remote(solid, make_law, self.info.resolution_m, limits[solid.name], *times_s)
         return SolidContact(solid, make_law, self.info.resolution_m)
 
     def _take_objects(self, switch: SpaceSwitch) -> None:
@@ -380,6 +384,14 @@ class SpaceTick(ControlTick):
 
 def _object_limits(scene: SceneConfig) -> Limits:
     return {limits.name: limits for limits in port_limits(scene) if limits.kind == "object"}
+
+
+def _held_by(solids: Iterable[SolidContact], comes: Solid) -> Proxy | None:
+    """What holds the device where another solid comes; one that has an object of that one's goes before others."""
+    names = {config.name for config in comes.configs}
+    touched = [contact.solid for contact in solids if contact.solid.proxy.touching]
+    touched.sort(key=lambda solid: names.isdisjoint(config.name for config in solid.configs))
+    return touched[0].proxy if touched else None
 
 
 def _places(solids: Iterable[SolidContact]) -> list[tuple[object, ...]]:

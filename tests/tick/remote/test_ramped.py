@@ -27,10 +27,10 @@ def test_a_new_goal_begins_at_the_force_of_then_and_ends_at_its_own(
         ramped.aim(goal, s, limit)
         assert ramped.goal == goal
         assert ramped.force(s, limit) == pytest.approx(before)
-        ramped.go_on(step)
+        ramped.go_on(step, step)
         between = (1.0 - step) * before + step * min(goal * s, limit)
         assert ramped.force(s, limit) == pytest.approx(between)
-    ramped.go_on(1.0)
+    ramped.go_on(1.0, 1.0)
     assert (ramped.now, ramped.force(s, limit)) == (third, min(third * s, limit))
 
 
@@ -41,7 +41,7 @@ def test_what_it_stores_is_the_work_of_its_force_from_there_to_nothing(
 ) -> None:
     ramped = Ramped(first)
     ramped.aim(second, s, limit)
-    ramped.go_on(step)
+    ramped.go_on(step, step)
     parts = 400
     work_j = sum(ramped.force((n + 0.5) * s / parts, limit) for n in range(parts)) * s / parts
     assert ramped.stored(s, limit) == pytest.approx(work_j, rel=1e-4, abs=1e-12)
@@ -58,8 +58,8 @@ def test_what_it_stores_is_the_work_of_its_force_from_there_to_nothing(
 def test_without_length_it_goes_over_from_the_coefficient_of_then() -> None:
     ramped = Ramped(1000.0)
     ramped.aim(200.0, 0.0, 5.0)
-    ramped.go_on(0.25)
+    ramped.go_on(0.25, 0.25)
     assert ramped.now == pytest.approx(800.0)
     ramped.aim(0.0, 0.0, 5.0)
-    ramped.go_on(0.5)
+    ramped.go_on(0.5, 0.5)
     assert ramped.now == pytest.approx(400.0)

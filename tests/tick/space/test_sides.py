@@ -56,6 +56,31 @@ def test_a_reload_leaves_a_held_device_on_its_side_of_a_thin_object(before: str,
     assert min(force_n[2] for force_n in rig.forces[-200:]) > 1.0
 
 
+RIB = table("rib", "box", 1000.0, size_m=(0.01, 0.01, 0.01), position_m=(0.03, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (plate(), RIB + plate()),
+        (RIB + plate(), plate()),
+        (RIB + plate(), RIB.replace("1000.0", "900.0") + plate()),
+        (plate(), plate(remote=True)),
+        (plate(remote=True), plate()),
+        (plate(), plate().replace('"plate"', '"panel"')),
+        (table("other", "sphere", 1000.0, radius_m=0.05, position_m=(0.0, 0.0, -0.048)), plate()),
+    ],
+    ids=["joined in front", "joined no more", "no part any more", "a client's", "no client's", "renamed", "another"],
+)
+def test_a_reload_that_has_another_solid_hold_a_device_leaves_it_on_its_side(before: str, after: str) -> None:
+    """Whatever its name is: 3 N became -1 N, for good."""
+    rig = Rig(before, "none").start((0.0, 0.0, 0.01)).to((0.0, 0.0, -0.001), 200)
+    assert rig.force[2] == pytest.approx(3.0)
+    rig.switch(after).to((0.0, 0.0, -0.001), 200)
+    assert rig.force[2] == pytest.approx(3.0, abs=0.3)
+    assert min(force_n[2] for force_n in rig.forces[-200:]) > 1.0
+
+
 def test_a_reload_under_a_device_that_is_deep_in_a_new_shape_still_finds_a_surface() -> None:
     """Where the surface was is far within it: it leaves by the nearest."""
     rig = Rig(plate(), "none").start((0.0, 0.0, 0.01)).to((0.0, 0.0, -0.001), 200)
