@@ -193,21 +193,32 @@ static inline void end_cycle(law_state *s, const law_params *p, const law_tick *
     s->highest_m = t->x_m;
 }
 
-static inline double damping_cap(law_state *s, const law_params *p, const law_tick *t) {
-    if (s->period_s == 0.0) s->period_s = t->dt_s;
-    s->period_s += 0.01 * (t->dt_s - s->period_s);
+static inline bool keep_period(law_state *s, double dt_s) {
+    bool first = !s->period_is_known;
+    if (first) {
+        s->period_is_known = s->period_s > 0.0;
+        if (!s->period_is_known || dt_s < s->period_s) s->period_s = dt_s;
+    }
+    double bounded_s = dt_s < 2.0 * s->period_s ? dt_s : 2.0 * s->period_s;
+    s->period_s += 0.01 * (bounded_s - s->period_s);
+    return first && s->period_is_known;
+}
+
+static inline double damping_cap(law_state *s, const law_params *p) {
     double cap = p->cap_damping_n_s_per_m;
     if (p->cap == CAP_NONE) {
         cap = LIMIT;
     } else if (p->cap != CAP_FIXED) {
         double mass = p->cap == CAP_KNOWN_MASS ? p->mass_kg : s->felt_mass_kg;
         if (mass > 0.0) cap = (s->forces_late ? p->late_cap_share : p->cap_share) * mass / s->period_s;
+        if (p->cap == CAP_FELT_MASS && cap > 300.0) cap = 300.0;
     }
     return cap;
 }
 
 static inline double law_step(law_state *s, const law_params *p, const law_tick *t) {
     if (p->cap == CAP_FELT_MASS || p->force_delay == FORCE_DELAY_IDENTIFIED) feel(s, p, t);
+    if (keep_period(s, t->dt_s)) s->damping_n_s_per_m = s->uncut_n_s_per_m;
     if (t->in_contact && !s->was_in_contact && p->new_contact != NEW_CONTACT_KEEP) {
         begin(s, 0.0);
         if (p->new_contact == NEW_CONTACT_DAMPING) s->damping_n_s_per_m = 0.0;
@@ -229,7 +240,8 @@ static inline double law_step(law_state *s, const law_params *p, const law_tick 
         if (s->count >= FELT_SAMPLES) believe(s, p);
         end_cycle(s, p, t);
     }
-    double cap = damping_cap(s, p, t);
+    double cap = damping_cap(s, p);
+    if (!s->period_is_known) s->uncut_n_s_per_m = s->damping_n_s_per_m;
     if (s->damping_n_s_per_m > cap) {
         s->damping_n_s_per_m = cap;
     } else if (s->damping_n_s_per_m < -cap) {

@@ -14,7 +14,7 @@ from pydantic import Field
 from hapticd.law import LawParams
 from hapticd.tick.energy import cycle_ended
 from hapticd_controllers.cycle_sums import CycleSums, begin, end
-from hapticd_controllers.felt_mass import FELT_SAMPLES, FeltFields, believe, feel, know_nothing
+from hapticd_controllers.felt_mass import FELT_SAMPLES, FeltFields, believe, feel, keep_period, know_nothing
 
 LEARNED = ("damping_n_s_per_m",)
 RESTS_OUTSIDE = True
@@ -32,6 +32,7 @@ CAP_FELT_MASS, CAP_KNOWN_MASS, CAP_FIXED, CAP_NONE = range(4)
 
 LIMIT = 1e12  # a quotient that is kept grows no further, in SI units; what is only summed cannot overflow
 TINY_MOTION = 1e-24  # a cycle with less sum of v^2 dt [m^2/s] is rest: there is nothing to divide by
+MOST_BY_FELT_MASS = 300.0  # most damping whatever was felt: a hand that moves is easily taken for a mass [N s/m]
 
 
 class Params(LawParams):
@@ -103,20 +104,20 @@ class State(CycleSums, FeltFields):
     """What is remembered of one wall: cycle detector, energy, damping, and the evidence for mass and delay."""
 
     damping_n_s_per_m: float  # alpha, in force until the next cycle ends
+    uncut_n_s_per_m: float  # the same before the first sample's cap
     was_in_contact: bool
-    period_s: float  # dt, smoothed: one overrun is not another sampling rate
     last_work_n: float  # the force that went into the energy, one sample ago
 
 
 def start(state: Any, params: Any, snapshot: Any) -> None:
     """Take over: damping that was reached and energy that was not dissipated count; a credit does not."""
     state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
+    state.uncut_n_s_per_m = state.damping_n_s_per_m
     know_nothing(state, params.force_delay == FORCE_DELAY_ONE_SAMPLE)
     state.was_in_contact = False
     state.lowest_m = snapshot.x_m
     state.highest_m = snapshot.x_m
     begin(state, min(0.0, -_bounded(snapshot.debt_j)))
-    state.period_s = 0.0
     state.last_work_n = 0.0
 
 
@@ -124,6 +125,8 @@ def step(state: Any, params: Any, tick: Any) -> float:
     """The contact's own force plus the damping that past cycles called for.  -> force on the device [N]."""
     if params.cap == CAP_FELT_MASS or params.force_delay == FORCE_DELAY_IDENTIFIED:
         feel(state, tick, params.felt_mass_memory)
+    if keep_period(state, tick.dt_s):  # a cap by the first sample's time, before which the device was enabled, is none
+        state.damping_n_s_per_m = state.uncut_n_s_per_m
     if tick.in_contact and not state.was_in_contact and params.new_contact != NEW_CONTACT_KEEP:
         begin(state, 0.0)
         if params.new_contact == NEW_CONTACT_DAMPING:
@@ -145,7 +148,9 @@ def step(state: Any, params: Any, tick: Any) -> float:
             believe(state, params.force_delay == FORCE_DELAY_IDENTIFIED)
         _end_cycle(state, params, tick)
 
-    cap = _cap(state, params, tick)
+    cap = _cap(state, params)
+    if not state.period_is_known:
+        state.uncut_n_s_per_m = state.damping_n_s_per_m
     if state.damping_n_s_per_m > cap:
         state.damping_n_s_per_m = cap
     elif state.damping_n_s_per_m < -cap:
@@ -153,8 +158,8 @@ def step(state: Any, params: Any, tick: Any) -> float:
     if not tick.in_contact:
         return 0.0
     force_n: float = tick.contact_n - state.damping_n_s_per_m * tick.velocity_m_per_s  # eq. 9
-    if force_n < 0.0 and not params.wall_may_pull:
-        force_n = 0.0
+    if not params.wall_may_pull and (force_n > 0.0 if tick.x_m > 0.0 else force_n < 0.0):
+        force_n = 0.0  # along a surface a spring is stretched either way
     return force_n
 
 
@@ -207,11 +212,8 @@ def _end_cycle(state: Any, params: Any, tick: Any) -> None:
         state.candidate_motion_m2_per_s = 0.0
 
 
-def _cap(state: Any, params: Any, tick: Any) -> float:
+def _cap(state: Any, params: Any) -> float:
     """Largest damping now: on a mass m a sampled damper is itself unstable from 2 m/dt, one sample late 0.83 m/dt."""
-    if state.period_s == 0.0:
-        state.period_s = tick.dt_s
-    state.period_s += 0.01 * (tick.dt_s - state.period_s)
     cap: float = params.cap_damping_n_s_per_m
     if params.cap == CAP_NONE:
         cap = LIMIT
@@ -220,6 +222,8 @@ def _cap(state: Any, params: Any, tick: Any) -> float:
         if mass_kg > 0.0:
             share = params.late_cap_share if state.forces_late else params.cap_share
             cap = share * mass_kg / state.period_s
+        if params.cap == CAP_FELT_MASS and cap > MOST_BY_FELT_MASS:
+            cap = MOST_BY_FELT_MASS
     return cap
 
 

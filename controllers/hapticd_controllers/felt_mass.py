@@ -12,12 +12,16 @@ LIMIT = 1e12  # a quotient that is kept grows no further, in SI units
 FELT_SAMPLES = 20.0  # effective samples before an identified mass is believed
 LEAST_PUSH = 0.005  # negative friction beyond this share of mass / dt is a force one sample late, not an active device
 LEAST_EXCITATION = 1e-4  # forces that vary less, as a share of their mean square, tell rounding and not a mass
+SMOOTHED = 0.01  # share of a new dt in the period
+LATE = 2.0  # in periods: a longer dt is a tick that came late, and not another sampling rate
 FELT_COUNTS = 2.0  # a shorter move, in counts of the position, says more about the quantiser than about the mass
 
 
 class FeltFields:
     """The scalar fields of the evidence."""
 
+    period_s: float  # dt, smoothed: one overrun is not another sampling rate
+    period_is_known: bool  # not of the first sample alone: what came before it may have taken long
     felt_mass_kg: float  # what the force accelerates; 0 while unknown
     forces_late: bool  # whether the device applies a force one sample late
     last_moved_m: float
@@ -46,6 +50,8 @@ def know_nothing(state: Any, late: bool) -> None:
         state: an object with the fields of `FeltFields`.
         late: whether forces are one sample late, as far as is known.
     """
+    state.period_s = 0.0
+    state.period_is_known = False
     state.felt_mass_kg = 0.0
     state.forces_late = late
     state.last_moved_m = 0.0
@@ -65,6 +71,24 @@ def know_nothing(state: Any, late: bool) -> None:
     state.late_sum_uu = 0.0
     state.late_sum_us = 0.0
     state.late_sum_uw = 0.0
+
+
+def keep_period(state: Any, dt_s: float) -> bool:
+    """Know how long it is from sample to sample.
+
+    Args:
+        state: an object with the fields of `FeltFields`.
+        dt_s: time since the last sample [s].
+
+    Returns:
+        Whether it is known from this sample on.
+    """
+    first = not state.period_is_known
+    if first:
+        state.period_is_known = state.period_s > 0.0
+        state.period_s = min(state.period_s, dt_s) if state.period_is_known else dt_s
+    state.period_s += SMOOTHED * (min(dt_s, LATE * state.period_s) - state.period_s)
+    return first and state.period_is_known
 
 
 def feel(state: Any, tick: Any, keep: float) -> None:

@@ -30,7 +30,7 @@ from typing import Any
 from hapticd.law import Field, LawParams
 from hapticd.tick.energy import cycle_ended
 from hapticd_controllers.cycle_sums import CycleSums, begin, end
-from hapticd_controllers.felt_mass import FELT_SAMPLES, FeltFields, believe, feel, know_nothing
+from hapticd_controllers.felt_mass import FELT_SAMPLES, FeltFields, believe, feel, keep_period, know_nothing
 
 LEARNED = ("damping_n_s_per_m",)
 RESTS_OUTSIDE = True
@@ -78,7 +78,6 @@ class State(CycleSums, FeltFields):
     cycle_s: float  # in force since the last cycle's end
     velocity_m_per_s: float  # smoothed
     was_in_contact: bool
-    period_s: float  # dt, smoothed: one overrun is not another sampling rate
     last_port_n: float  # the port's own force, one sample ago
 
 
@@ -95,7 +94,6 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     begin(state, min(0.0, -_bounded(snapshot.debt_j)))
     state.lowest_m = snapshot.x_m
     state.highest_m = snapshot.x_m
-    state.period_s = 0.0
     state.last_port_n = 0.0
 
 
@@ -193,9 +191,7 @@ def _forget(state: Any) -> None:
 
 def _bound(state: Any, params: Any, tick: Any) -> None:
     """No less than the spring's base, and no more than the device bears."""
-    if state.period_s == 0.0:
-        state.period_s = tick.dt_s
-    state.period_s += 0.01 * (tick.dt_s - state.period_s)
+    keep_period(state, tick.dt_s)
     most: float = params.most_unfelt_n_s_per_m
     if state.felt_mass_kg > 0.0:
         share = LATE_SHARE_OF_MASS if state.forces_late else SHARE_OF_MASS

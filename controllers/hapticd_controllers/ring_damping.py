@@ -14,7 +14,8 @@ and whether it is the contact's own or a hand's: no hand turns within 45 ms. k i
 less where a limit holds force back; the damping B, part of a sample late, hides B dt of the mass. Nothing about the
 device is given. Before the first turn the mass is unknown; a brake that grows with the time is the full one of any mass
 a quarter of a period after the touch, and takes from an arrival where that means to push, not to pull. One decision is
-made a swing, none between. docs/controllers.md has the reasons and the evidence.
+made a swing, none between. docs/controllers.md has the reasons and the evidence. All of it stands in one module: swings,
+what they say and what comes of it share one state and are read in that order.
 """
 
 from __future__ import annotations
@@ -62,6 +63,8 @@ SOFTENS = 0.5  # of the stiffness, from tick to tick: another wall, at which the
 SLOWER = 0.9  # of the base, for each swing of a hand: this wall is being used and does not ring
 LEFT = 0.5  # of the base, for each time the device has left for good, or the wall has softened
 MOST_LEAKS = 1e3
+LATE = 2.0  # in sampling periods: a longer dt is that of a tick that came late, and a shorter one of that after it
+SMOOTHED = 0.05  # of such a dt in that period: another rate is followed, by at most 5 % a tick
 INHERITED = 4.0  # leaks taken over from the law before, at most: what holds every wall without delay
 
 
@@ -90,6 +93,10 @@ class State:
     damping_n_s_per_m: float  # base and brake now; outside the wall the base
     base_n_s_per_m: float  # learned: what stays between rings
     leak_n_s_per_m: float  # k dt / 2 where it was last in the wall
+    stiffness_n_per_m: float  # k there
+    period_s: float  # the usual dt: one overrun is not another sampling rate
+    earliest_s: float  # dt from here
+    latest_s: float  # to here is a usual one; 0 while not known
     felt_mass_kg: float  # learned: what the wall swings; 0 while unknown
     leaks: float  # base in k dt / 2; 0 until the first contact
     first_brake: float  # learned: damping ratio that a ring starts with
@@ -121,6 +128,10 @@ def start(state: Any, params: Any, snapshot: Any) -> None:
     state.base_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
     state.damping_n_s_per_m = state.base_n_s_per_m
     state.leak_n_s_per_m = 0.0
+    state.stiffness_n_per_m = 0.0
+    state.period_s = 0.0
+    state.earliest_s = 0.0
+    state.latest_s = 0.0
     state.felt_mass_kg = 0.0
     state.leaks = 0.0
     state.first_brake = params.brake_ratio
@@ -145,16 +156,19 @@ def step(state: Any, params: Any, tick: Any) -> float:
     """The contact's own force, less base and brake.  -> force on the device [N]."""
     turn_m = _turn_threshold(state, tick)
     state.swing_s += tick.dt_s
+    dt_s = tick.dt_s
     stiffness = 0.0
     inside = tick.in_contact
     if inside:
+        if not state.earliest_s <= dt_s <= state.latest_s:
+            dt_s = _unusual(state, dt_s)
         stiffness = tick.spring_n / -tick.x_m
         if stiffness > LIMIT:
             stiffness = LIMIT
         elif stiffness < 0.0:
             stiffness = 0.0
         if state.leaks == 0.0:
-            _inherit(state, stiffness, tick.dt_s)
+            _inherit(state, stiffness, dt_s)
         if not state.was_in_contact:
             _begin(state, 0.0, False, False)
             state.arrives = state.swings == 0.0
@@ -166,12 +180,13 @@ def step(state: Any, params: Any, tick: Any) -> float:
         _fall_silent(state, params, inside)
     if not inside:
         return 0.0
-    _set_damping(state, params, stiffness, tick.dt_s)
+    _set_damping(state, params, stiffness, dt_s)
     force_n: float = tick.contact_n - state.damping_n_s_per_m * tick.velocity_m_per_s  # eq. 9
     if state.arrives:
         force_n += _evenly(state, tick)
-    if force_n < 0.0 and state.stubborn < params.pull_after:
-        force_n = max(force_n, min(0.0, tick.contact_n))  # a wall does not hold on to who leaves
+    if force_n * tick.x_m > 0.0 and state.stubborn < params.pull_after:
+        # A wall does not hold on to who leaves, nor does what sticks along a surface, which is stretched either way.
+        force_n = max(force_n, min(0.0, tick.contact_n)) if force_n < 0.0 else min(force_n, max(0.0, tick.contact_n))
     return force_n
 
 
@@ -358,13 +373,14 @@ def _inherit(state: Any, stiffness: float, dt_s: float) -> None:
 def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None:
     """Base and brake at the stiffness of now, so that both soften with the wall."""
     leak = 0.5 * stiffness * dt_s
-    if leak < SOFTENS * state.leak_n_s_per_m:
+    if stiffness < SOFTENS * state.stiffness_n_per_m:
         state.age = 0.0
         _relax(state, LEFT)
     base = leak * state.leaks
     if state.leaks > 1.0 and state.felt_mass_kg > 0.0:
         base = max(leak, min(base, BASE_OF_MASS * state.felt_mass_kg / dt_s))
     state.leak_n_s_per_m = leak
+    state.stiffness_n_per_m = stiffness
     state.base_n_s_per_m = base
     damping = base
     if state.brake > 0.0:
@@ -376,6 +392,27 @@ def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None
             brake = min(brake, _full(state, state.first_brake, stiffness, dt_s))
         damping = _bounded(base + brake)
     state.damping_n_s_per_m = damping
+
+
+def _unusual(state: Any, dt_s: float) -> float:
+    """What to reckon with for a time between samples that is not the usual one [s]; what is usual follows slowly.
+
+    The first two are not known to be: what came before the first may have taken long.
+    """
+    period_s: float = state.period_s
+    bounded_s: float
+    if period_s == 0.0:
+        state.period_s = dt_s
+        return dt_s
+    if state.latest_s == 0.0:
+        state.period_s = min(period_s, dt_s)
+        bounded_s = min(dt_s, LATE * state.period_s)
+    else:
+        bounded_s = state.latest_s if dt_s > state.latest_s else state.earliest_s
+        state.period_s += SMOOTHED * (bounded_s - period_s)
+    state.latest_s = LATE * state.period_s
+    state.earliest_s = state.period_s / LATE
+    return bounded_s
 
 
 def _evenly(state: Any, tick: Any) -> float:

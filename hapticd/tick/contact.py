@@ -191,9 +191,11 @@ class Contact:
             velocity_m_per_s: velocity of the wall's axis [m/s].
             dt_s: time between the last two samples [s].
         """
+        if not (self.law.learns_damping and law.learns_damping):  # else another one may come before this one is asked
+            self.damping_n_s_per_m = 0.0
+        self.felt_mass_kg = 0.0
         self.law = law
         self.awake = self._touched = True  # it is shown that it is outside
-        self.damping_n_s_per_m = self.felt_mass_kg = 0.0
         # The law before may have left anything in its tick.
         self.tick = tick = LawTick(self._resolution_m)
         tick.x_m = self.x_m

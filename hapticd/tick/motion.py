@@ -13,6 +13,11 @@ LEAST_S = 1e-9
 MOST_S = 1.0
 """Time between two samples [s]: less is standing still, and for longer the nominal period goes into the laws."""
 
+NEW_SHARE = 0.05
+LONGER = 2.0
+"""Share of a new time between samples in the usual one, which it counts at most so many times of, and how much shorter
+than that no time between samples of a device without a clock is."""
+
 MOST_M = 1e7
 MOST_M_PER_S = 1e6
 """No position and no velocity is beyond these, whatever a device declares [m], [m/s]."""
@@ -67,6 +72,7 @@ class Motion:
         "_has_sequence",
         "_period_s",
         "_sequence",
+        "_usual_s",
         "_waited_s",
         "dt_s",
         "estimators",
@@ -114,6 +120,7 @@ class Motion:
         self.time_ns = -1
         self._sequence = -1
         self._waited_s = 0.0
+        self._usual_s = period_s  # between samples of a device without a clock
 
     def start(self, sample: Sample) -> bool:
         """Begin at a sample, at rest; False when it makes no sense, and it is not known where the device is."""
@@ -145,7 +152,7 @@ class Motion:
             self._waited_s += clock_dt_s
             dt_s = 0.0
             if not repeats:
-                dt_s = self._waited_s
+                dt_s = self._between(self._waited_s)
                 self._waited_s = 0.0
         if repeats:
             self.repeated += 1
@@ -185,6 +192,17 @@ class Motion:
                 speed_squared += velocity_m_per_s * velocity_m_per_s
         self.speed_squared = speed_squared
         return True
+
+    def _between(self, waited_s: float) -> float:
+        """Time between two samples of a device without a clock, from that between the ticks that read them [s].
+
+        The tick after a late one comes early, and what the device has by then is a whole sample newer: it would have
+        moved at ten times its speed.
+        """
+        if not LEAST_S <= waited_s < MOST_S:
+            return waited_s
+        self._usual_s += NEW_SHARE * (min(waited_s, LONGER * self._usual_s) - self._usual_s)
+        return max(waited_s, self._usual_s / LONGER)
 
     @property
     def frozen(self) -> bool:

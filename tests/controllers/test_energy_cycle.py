@@ -203,6 +203,47 @@ def test_one_late_sample_does_not_cut_the_damping() -> None:
     assert rig.state.damping_n_s_per_m == pytest.approx(before, rel=0.1)
 
 
+@pytest.mark.parametrize("first_s", [1e-3, 0.02, 0.3])
+def test_a_first_sample_that_came_late_cuts_no_learnt_damping(first_s: float) -> None:
+    """The time in which a device is enabled: 60 N s/m were 0.5 from then on."""
+    params = Params(cap="known-mass", mass_kg=0.25)
+    state, made = fresh_state(energy_cycle), plain_object("Params", scalar_params(params))
+    energy_cycle.start(state, made, LawSnapshot(x_m=-1e-3, damping_n_s_per_m=60.0))
+    tick = LawTick(1e-5)
+    tick.in_contact, tick.x_m, tick.contact_n, tick.velocity_m_per_s = True, -1e-3, 5.0, 0.1
+    forces_n = []
+    for tick.dt_s in (first_s, 1e-3, 1e-3, 0.5, 1e-3):
+        forces_n.append(energy_cycle.step(state, made, tick))
+    cap = min(60.0, 0.6 * 0.25 / first_s)
+    assert forces_n[0] == pytest.approx(5.0 - 0.1 * cap)
+    assert forces_n[1:] == pytest.approx([5.0 - 6.0] * 4)
+    assert state.damping_n_s_per_m == 60.0
+    assert state.period_s == pytest.approx(1e-3, rel=0.02)
+
+
+def test_no_hand_that_is_taken_for_a_mass_gets_more_damping_than_a_device_bears() -> None:
+    """A hand of 1 kg that moved at 8 Hz was felt as 33 kg; once it let go the device shook from limit to limit."""
+    state, made = fresh_state(energy_cycle), plain_object("Params", scalar_params(Params()))
+    energy_cycle.start(state, made, LawSnapshot(x_m=-1e-3, damping_n_s_per_m=2000.0))
+    state.felt_mass_kg = 33.0
+    tick = LawTick(1e-5)
+    tick.in_contact, tick.x_m, tick.dt_s = True, -1e-3, 1e-3
+    energy_cycle.step(state, made, tick)
+    assert state.damping_n_s_per_m == 300.0
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_what_may_not_pull_does_not_on_either_side_of_a_surface(side: float) -> None:
+    """What sticks is stretched either way: to one side it gave 0 N of 1.5."""
+    state, made = fresh_state(energy_cycle), plain_object("Params", scalar_params(Params(wall_may_pull=False)))
+    energy_cycle.start(state, made, LawSnapshot(x_m=1e-3 * side, damping_n_s_per_m=40.0))
+    tick = LawTick(1e-5)
+    tick.in_contact, tick.x_m, tick.dt_s, tick.contact_n = True, 1e-3 * side, 1e-3, -1.5 * side
+    assert energy_cycle.step(state, made, tick) == -1.5 * side
+    tick.velocity_m_per_s = -0.1 * side  # it leaves, and is held back by 4 N
+    assert energy_cycle.step(state, made, tick) == 0.0
+
+
 def test_what_the_law_before_owed_and_reached_is_taken_over() -> None:
     rig = Rig(energy_cycle, Device())
     energy_cycle.start(rig.state, rig.params, LawSnapshot(debt_j=0.002, damping_n_s_per_m=12.0))

@@ -66,6 +66,52 @@ def watched(x_m: list[float]) -> list[tuple[float, float]]:
     return found
 
 
+def shown(x_m: float, times_s: list[float], velocity_m_per_s: float = 0.0) -> tuple[Any, list[float]]:
+    """A fresh law with 8 leaks of 4 kN/m that stands at x_m for these times between samples, and its forces."""
+    state, params = fresh_state(ring_damping), plain_object("Params", scalar_params(Params(least_brake_ratio=0.0)))
+    ring_damping.start(state, params, LawSnapshot(x_m=x_m))
+    tick, forces_n = LawTick(1e-6), []
+    tick.in_contact, tick.x_m, tick.velocity_m_per_s = True, x_m, velocity_m_per_s
+    tick.spring_n = tick.contact_n = -4e3 * x_m
+    for number, tick.dt_s in enumerate(times_s):
+        if number == 5:
+            state.leaks = 8.0
+        forces_n.append(ring_damping.step(state, params, tick))
+    return state, forces_n
+
+
+@pytest.mark.parametrize("late_s", [[2.1e-3], [1.9e-3, 0.1e-3], [2.5e-3, 1e-3, 2.5e-3, 1e-3, 2.5e-3], [0.03]])
+def test_a_late_tick_is_no_softer_wall(late_s: list[float]) -> None:
+    """Where a tick in time followed, half of what was learnt was forgotten: 8 leaks were 1 after three of them."""
+    state, _ = shown(-1e-3, [1e-3] * 50 + late_s + [1e-3] * 5)
+    assert state.leaks == 8.0
+    assert state.base_n_s_per_m == pytest.approx(8.0 * 2.0)
+
+
+def test_a_late_tick_is_damped_as_at_twice_the_time_at_most() -> None:
+    """100 ms late it had 250 N s/m for one tick."""
+    times_s = [1e-3] * 50
+    on_time, _ = shown(-1e-3, times_s)
+    late, _ = shown(-1e-3, [*times_s, 0.1])
+    assert late.base_n_s_per_m == pytest.approx(2.0 * on_time.base_n_s_per_m)
+    first_late, _ = shown(-1e-3, [0.3, *times_s])
+    assert first_late.base_n_s_per_m == pytest.approx(on_time.base_n_s_per_m)
+
+
+def test_another_rate_is_followed() -> None:
+    for dt_s in (0.25e-3, 10e-3):
+        state, _ = shown(-1e-3, [1e-3] * 50 + [dt_s] * 200)
+        assert state.base_n_s_per_m == pytest.approx(8.0 * 0.5 * 4e3 * dt_s)
+
+
+def test_damping_pulls_on_neither_side_of_a_surface() -> None:
+    """What sticks is stretched either way."""
+    for out in (0.1, 0.5):
+        (_, low_n), (_, high_n) = (shown(1e-3 * side, [1e-3] * 20, -out * side) for side in (-1.0, 1.0))
+        assert high_n == pytest.approx([-newton for newton in low_n])
+        assert min(low_n) >= 0.0
+
+
 # What it leaves alone
 
 

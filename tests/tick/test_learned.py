@@ -50,6 +50,19 @@ def test_what_one_law_published_is_not_said_of_the_next() -> None:
     assert (contact.damping_n_s_per_m, contact.felt_mass_kg) == (0.0, 0.0)
 
 
+def test_what_was_learnt_goes_on_through_two_laws_between_two_samples() -> None:
+    """As of a device that is armed twice, or of two reloads between its samples: 7 N s/m became 0."""
+    first, _ = learner(("damping_n_s_per_m",))
+    rig = pressed(module=first)
+    found = []
+    for _ in range(3):
+        module, found_by_it = learner(("damping_n_s_per_m",))
+        rig.switch(make_law=running(module))
+        assert rig.tick.contacts[0].damping_n_s_per_m == 30.0
+        found += found_by_it
+    assert found == [30.0] * 3
+
+
 def test_after_the_fallback_a_law_starts_without_the_fallbacks_damping() -> None:
     """C4: it started with 50 N s/m, and a damping that never decreases stayed there."""
     rig = pressed(module=energy_cycle, safe_damping_n_s_per_m=50.0)

@@ -44,11 +44,38 @@ def test_an_even_motion_has_an_even_velocity(kind: str, velocity: dict[str, Any]
 
 def test_without_clock_and_count_nobody_can_tell_a_repeated_sample_from_a_rest() -> None:
     rig = Rig(at_m=0.0)
-    for number in range(1, 9):
+    for number in range(1, 97):
         if number % EVERY == 0:
             rig.sample.position_m[0] += SPEED_M_PER_S * EVERY * PERIOD_S
         rig.tick.step(rig.sample, PERIOD_S)
     assert rig.tick.motion.velocity_m_per_s[0] == pytest.approx(EVERY * SPEED_M_PER_S)
+
+
+@pytest.mark.parametrize("has_sequence", [False, True])
+def test_a_tick_in_time_after_a_late_one_makes_nobody_ten_times_as_fast(has_sequence: bool) -> None:
+    """A device that takes a sample a millisecond has a whole one more in the 0.1 ms that are left: 3 m/s of 0.3."""
+    rig = Rig(at_m=0.0, has_sequence=has_sequence, safety={"max_speed_m_per_s": 1.0})
+    at_s = 0.0
+    for dt_s in [1e-3] * 50 + [1.9e-3, 0.1e-3] + [1e-3] * 20:
+        at_s += dt_s
+        samples = round(at_s * 1e3 - 0.05)
+        rig.sample.position_m[0] = 0.3e-3 * samples
+        rig.sample.sequence = samples
+        rig.tick.step(rig.sample, dt_s)
+        assert rig.tick.motion.velocity_m_per_s[0] <= 0.6 + 1e-9
+    assert rig.tick.fault == 0
+    assert rig.tick.motion.velocity_m_per_s[0] == pytest.approx(0.3)
+
+
+def test_another_rate_of_a_device_without_a_clock_is_followed() -> None:
+    rig = Rig(at_m=0.0, has_sequence=True)
+    for every in (1, 10, 1):
+        for number in range(2000):
+            if number % every == 0:
+                rig.sample.position_m[0] += 0.1e-3 * every
+                rig.sample.sequence += 1
+            rig.tick.step(rig.sample, 1e-3)
+        assert rig.tick.motion.velocity_m_per_s[0] == pytest.approx(0.1)
 
 
 def test_the_time_that_a_law_is_told_is_the_time_that_passed() -> None:

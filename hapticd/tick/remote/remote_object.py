@@ -229,9 +229,9 @@ class RemoteContact(SolidContact):
         everywhere.reach_limit = inf
         return everywhere
 
-    def start(self, x: float, y: float, z: float, held: Proxy | None = None) -> None:
+    def start(self, x: float, y: float, z: float) -> None:
         """Have the device at a point of the world, at rest and without force; the object stops where it is."""
-        super().start(x, y, z, held)
+        super().start(x, y, z)
         self.port.stand()
         self.port.force_n[:] = (0.0, 0.0, 0.0)
         self._waited_s = 0.0

@@ -88,13 +88,8 @@ class Channel(Contact):
         )
 
     def take_law(self, law: RunningLaw, velocity_m_per_s: float, dt_s: float) -> None:
-        """Go on with another law, already started; the caller blends. The velocity is its own.
-
-        At rest a law is not asked, and what it was started with, the next one is to find all the same.
-        """
-        learned_n_s_per_m = self.damping_n_s_per_m if self.law.learns_damping and law.learns_damping else 0.0
+        """Go on with another law, already started; the caller blends. The velocity is its own."""
         super().take_law(law, self.velocity_m_per_s, dt_s)
-        self.damping_n_s_per_m = learned_n_s_per_m
         self.tick.x_m = self.x_of_law_m
 
     def see(

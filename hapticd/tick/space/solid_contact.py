@@ -116,19 +116,21 @@ class SolidContact:
         """What tells where the device may touch it, until its proxy is another."""
         return self.solid.proxy
 
-    def start(self, x: float, y: float, z: float, held: Proxy | None = None) -> None:
-        """Have the device at a point of the world, at rest and without force [m].
-
-        Where this one comes in the place of another one, by which the device is held, it is held on the same side.
-        """
+    def start(self, x: float, y: float, z: float) -> None:
+        """Have the device at a point of the world, at rest and without force [m]."""
         proxy = self.solid.proxy
         place(proxy, proxy.others, proxy.voxels, x, y, z)
-        if held is not None and proxy.touching:
-            stays = place_before(proxy, proxy.others, proxy.voxels, held, x, y, z)
-            (follow if stays else place)(proxy, proxy.others, proxy.voxels, x, y, z)
         for channel in self.channels:
             channel.rest()
         self._stand()
+
+    def take_side(self, held: Proxy | None, x: float, y: float, z: float) -> None:
+        """Once started, hold the device on the side on which another one does that this one comes in the place of."""
+        proxy = self.solid.proxy
+        if held is not None and proxy.touching:
+            stays = place_before(proxy, proxy.others, proxy.voxels, held, x, y, z)
+            (follow if stays else place)(proxy, proxy.others, proxy.voxels, x, y, z)
+            self._stand()
 
     def rougher(self, solid: Solid, make_law: Callable[[], RunningLaw]) -> list[Channel]:
         """Channels along the surface that another solid in the place of this one needs, and this one has not."""

@@ -127,7 +127,8 @@ class SpaceTick(ControlTick):
                 x, y, z = self.motion.position_m
                 self.at_m = (x, y, z)
             for contact in switch.new:
-                contact.start(*self.at_m, _held_by(self.solids, contact.solid))
+                contact.start(*self.at_m)
+                contact.take_side(_held_by(self.solids, contact.solid), *self.at_m)
             self._start_laws(switch.laws)
 
         yield from self._switch(scene, safety, make_law, start)

@@ -75,6 +75,16 @@ def test_another_stiffness_of_a_coupling_comes_by_the_ramp(
     assert max(abs(after - before) for before, after in pairwise(forces_n)) <= 0.09
 
 
+def test_a_ramp_that_is_under_way_goes_by_the_time_of_a_late_tick() -> None:
+    """Else it would take longer than it may."""
+    rig = real(TOOL)
+    before_n = held(rig, position_m=[2e-3])
+    for dt_s in (PERIOD_S, PERIOD_S, 20e-3, PERIOD_S):
+        rig.say("tool", position_m=[2e-3], stiffness_n_per_m=0.0)
+        rig.go(dt_s=dt_s)
+    assert rig.force[0] == pytest.approx(before_n * (1.0 - 22e-3 / 50e-3)), "each tick gives what was reached before"
+
+
 @pytest.mark.parametrize("late_s", LATE)
 @pytest.mark.parametrize(
     ("was", "is_now"), [("max_force_n = 6.0", "max_force_n = 1.0"), ("n_per_m = 2000.0", "n_per_m = 200.0")]
