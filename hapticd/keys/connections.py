@@ -129,11 +129,13 @@ class ConnectionBound:
         """Look no more; after the socket is closed, and before its context ends. May be called twice."""
         self._closed.set()
         self._thread.join()
+        self._news.close(0)  # where the thread ended before its time: the context would wait for it
 
     def _run(self) -> None:
         # Until the socket is closed and all has been read: a thread of ZeroMQ may wait for that.
         while self._news.poll(_LOOK_MS) or not self._closed.is_set():
-            self._look_at_memory()
+            with contextlib.suppress(OSError):  # the next look is soon; without the thread ZeroMQ's own stand still
+                self._look_at_memory()
             if not self._news.poll(0):
                 continue
             news, where = self._news.recv_multipart()

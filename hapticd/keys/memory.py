@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import ctypes
 import enum
+import functools
 import os
-from pathlib import Path
 
 MOST_MORE_BYTES = 112 << 20
 """What the process may have resident beyond what it had before its first client, some 48 MB in a daemon [bytes]."""
 
 _FREED_S = 1.0  # what ended connections held is free again after that
 _FURTHER_BYTES = 64 << 20
+_STATM_BYTES = 256  # seven numbers
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
@@ -70,7 +71,13 @@ class MemoryBound:
 
 def resident_bytes() -> int:
     """What this process has in memory [bytes]."""
-    return int(Path("/proc/self/statm").read_bytes().split()[1]) * _PAGE_BYTES
+    return int(os.pread(_statm(os.getpid()), _STATM_BYTES, 0).split()[1]) * _PAGE_BYTES
+
+
+@functools.cache
+def _statm(_process: int) -> int:
+    """Kept open for the next look, which must not fail when no descriptor is left; a fork needs one of its own."""
+    return os.open("/proc/self/statm", os.O_RDONLY | os.O_CLOEXEC)
 
 
 def _give_back() -> None:

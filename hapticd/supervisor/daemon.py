@@ -133,7 +133,7 @@ class Daemon:
         try:
             return asyncio.run(self._serve())
         finally:
-            self._undo.close()
+            self._undo.close()  # where it did not come as far as to serve
 
     def stop(self, why: str) -> None:
         """Let the loop ramp the force out, and end.
@@ -170,11 +170,17 @@ class Daemon:
         return self._notifier.feed_during(self.release.release)
 
     async def _serve(self) -> int:
-        state = self.state
         signals = asyncio.get_running_loop()
         signals.add_signal_handler(signal.SIGTERM, self.stop, "SIGTERM")
         signals.add_signal_handler(signal.SIGINT, self.stop, "interrupt")
         signals.add_signal_handler(signal.SIGHUP, self._hang_up)
+        try:
+            return await self._serve_until_end()
+        finally:
+            self._undo.close()  # as long as signals are handled: a second Ctrl-C must not leave the force on
+
+    async def _serve_until_end(self) -> int:
+        state = self.state
         settings = state.config.config
         log.info(
             "%s: %s on %s at %g Hz, law %s, publishing on %s",

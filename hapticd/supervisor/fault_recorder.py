@@ -40,6 +40,8 @@ _REMEDIES = {
     errno.EMFILE: "raise the limit of open files (ulimit -n, LimitNOFILE=) and start the daemon again",
 }
 
+_NO_THREAD = "no thread can be started; free memory, or raise the limit of processes (ulimit -u, TasksMax=)"
+
 _MOST_WAITING = 4
 _PATIENCE_S = 1.0
 
@@ -96,7 +98,12 @@ class FaultRecorder:
         if self._writing is None and self._waiting and self._waiting[0].due():
             self._writing = self._waiting.popleft()
             self._writing.keep = keep
-            self._writing.start()
+            try:
+                self._writing.start()
+            except RuntimeError:
+                self._writing.drop()
+                self._writing = None
+                problem = f"fault record not written: {_NO_THREAD}"
         return problem
 
     def loop_ended(self) -> None:
@@ -153,6 +160,10 @@ class _Job(threading.Thread):
         if self._shared.words[RECORDS] >= self._end or time.monotonic() > self._give_up_s:
             self.complete = True
         return self.complete
+
+    def drop(self) -> None:
+        """Let go of the ring; it cannot be started."""
+        self._shared.close()
 
     def run(self) -> None:
         """Copy, compress, write."""

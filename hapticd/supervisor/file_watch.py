@@ -27,13 +27,14 @@ class FileWatcher:
 
     Args:
         path: the file.
-        text: what it said when it was read last.
+
+    Raises:
+        RuntimeError: no thread can be started.
     """
 
-    def __init__(self, path: Path, text: str) -> None:
+    def __init__(self, path: Path) -> None:
         self._path = path
         self._file = path.absolute()
-        self._text = text
         self._identity: tuple[int, ...] = ()
         self._found: deque[LoadedConfig | ConfigError] = deque(maxlen=1)
         self._closed = threading.Event()
@@ -41,7 +42,11 @@ class FileWatcher:
         self._thread.start()
 
     def take(self) -> LoadedConfig | ConfigError | None:
-        """What the file says, or why it cannot be used; None when it says nothing new since it was asked last."""
+        """What the file says, or why it cannot be used; None when it was not saved since this was asked last.
+
+        What it says when the watch begins comes as well, and what says the same as before: only who asks knows what is
+        in force, since others may have the file taken over meanwhile.
+        """
         try:
             return self._found.popleft()
         except IndexError:
@@ -69,10 +74,8 @@ class FileWatcher:
         """Read the file, which is another one than last time and has come to rest."""
         try:
             text = read(self._file, files_only=True)
-            if text == self._text or not text.strip():  # an empty file is one that is about to be written
-                return
-            self._text = text
-            self._found.append(parse(text, str(self._path)))
+            if text.strip():  # an empty file is one that is about to be written
+                self._found.append(parse(text, str(self._path)))
         except ConfigError as error:
             self._found.append(error)
         except Exception as error:  # noqa: BLE001 - whatever a plug-in's checks raise, the next save is to be seen

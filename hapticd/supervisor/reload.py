@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Iterator
@@ -40,6 +41,8 @@ CLOSE_S = 1.0
 CHECK_S = 120.0
 """How long a law may take to be imported before the file that names it counts as one that cannot be used [s]."""
 
+_NO_THREAD = "no thread can be started; free memory, or raise the limit of processes (ulimit -u, TasksMax=), and retry"
+
 
 class Reload:
     """Takes the file over, when somebody asks or, where the file says so, when it is saved; one at a time.
@@ -66,7 +69,12 @@ class Reload:
         state = self._state
         if self._reading is None and state.reload_asked:
             self._answers, state.reload_asked = state.reload_asked, []
-            self._reading = _Reading(state.config.path)
+            try:
+                self._reading = _Reading(state.config.path)
+            except RuntimeError:
+                answers, self._answers = self._answers, []
+                self._refuse(f"{state.config.path}: cannot be read: {_NO_THREAD}", answers)
+                return
         if self._reading is not None:
             read_now = self._reading.outcome
             if read_now is None:
@@ -79,6 +87,7 @@ class Reload:
             else:
                 self._begin(read_now, answers)
             return
+        self._follow()
         saved = self._watcher.take() if self._watcher is not None else None
         if isinstance(saved, ConfigError):
             self._refuse(str(saved), [])
@@ -144,7 +153,8 @@ class Reload:
         """Look at the file, or not, as it says itself."""
         wanted = self._state.config.config.service.reload_on_save
         if wanted and self._watcher is None:
-            self._watcher = FileWatcher(self._state.config.path, self._state.config.text)
+            with contextlib.suppress(RuntimeError):  # there is no thread to be had: tried again in the next turn
+                self._watcher = FileWatcher(self._state.config.path)
         elif self._watcher is not None and not wanted:
             self._watcher.close()
             self._watcher = None

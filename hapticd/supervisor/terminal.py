@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
+
+_GONE = (errno.ENXIO, errno.EIO, errno.ENOENT)
 
 
 class Terminal:
@@ -20,6 +23,6 @@ class Terminal:
 def _is_there() -> bool:
     try:
         os.close(os.open("/dev/tty", os.O_RDWR | os.O_NOCTTY | os.O_CLOEXEC))
-    except OSError:
-        return False
+    except OSError as error:  # also where no descriptor is left, which says nothing of a terminal
+        return error.errno not in _GONE
     return True

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -15,8 +19,9 @@ from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import ConfigError
 from hapticd.supervisor import file_watch
 from hapticd.supervisor.file_watch import QUIET_S, FileWatcher
+from hapticd.supervisor.reload import Reload
 from hapticd.tick.event import EventCode
-from tests.daemon.running import PATIENCE_S, Daemon, Subscriber
+from tests.daemon.running import PATIENCE_S, Daemon, Subscriber, wait_until
 from tests.daemon.test_deaths import PRESSED, pressing
 
 OLD = '[controller]\nlaw = "none"\n'
@@ -26,8 +31,11 @@ BAD = '[controller]\nlaw = "tdap"\n'
 
 @contextmanager
 def watched(path: Path) -> Iterator[FileWatcher]:
-    watcher = FileWatcher(path, path.read_text())
+    watcher = FileWatcher(path)
     try:
+        first = found(watcher)
+        assert isinstance(first, LoadedConfig), first
+        assert first.text == path.read_text()
         yield watcher
     finally:
         watcher.close()
@@ -175,22 +183,120 @@ def test_a_file_whose_checks_fail_in_an_unknown_way_is_told_and_the_next_save_is
         assert law_in(watcher) == "tdpa"
 
 
-def test_what_says_the_same_is_no_save_and_neither_is_a_file_that_is_empty_or_away(tmp_path: Path) -> None:
+def test_a_file_that_is_empty_or_away_is_no_save(tmp_path: Path) -> None:
     """An emptied file would be a usable configuration, without a wall: it is one that somebody is about to write."""
     file = tmp_path / "lab.toml"
     file.write_text(OLD)
     with watched(file) as watcher:
-        os.utime(file)
         file.write_text("")
         time.sleep(6.0 * QUIET_S)
         file.unlink()
         time.sleep(6.0 * QUIET_S)
-        file.write_text(OLD)
         (tmp_path / "other.toml").write_text(NEW)
         time.sleep(6.0 * QUIET_S)
         assert watcher.take() is None
         file.write_text(NEW)
         assert law_in(watcher) == "tdpa"
+
+
+class Following:
+    """A reload without a daemon around it, of a file that is taken over when it is saved."""
+
+    ON = "[service]\nreload_on_save = true\n"
+
+    def __init__(self, file: Path) -> None:
+        file.write_text(self.ON)
+        self.file = file
+        self.switches = 0
+        self.refused: list[str] = []
+        state: Any = SimpleNamespace(
+            config=parse(self.ON, str(file)),
+            recovery=SimpleNamespace(lost=False),
+            requests=SimpleNamespace(submit=self._switch),
+            reload_asked=[],
+            notifier=Mock(),
+            tell=lambda code, text: self.refused.append(text) if code == EventCode.REFUSED else None,
+            adopt=lambda config, _ring: setattr(state, "config", config),
+        )
+        self.state = state
+        self.reload = Reload(state)
+
+    def _switch(self, _request: object, finish: Callable[[str], None]) -> None:
+        self.switches += 1
+        finish("")
+
+    def ask(self) -> str:
+        """The verdict on a reload that somebody asks for."""
+        verdicts: list[str] = []
+        self.state.reload_asked = [verdicts.append]
+        self.turn_until(lambda: bool(verdicts), "a verdict")
+        return verdicts[0]
+
+    def turn_until(self, condition: Callable[[], bool], what: str) -> None:
+        def turned() -> bool:
+            self.reload.turn()
+            return condition()
+
+        wait_until(turned, what)
+
+    def turn_for(self, span_s: float) -> None:
+        end_s = time.monotonic() + span_s
+        self.turn_until(lambda: time.monotonic() > end_s, "the time to pass")
+
+
+@pytest.fixture
+def following(tmp_path: Path) -> Iterator[Following]:
+    made = Following(tmp_path / "lab.toml")
+    yield made
+    made.reload.close()
+
+
+def test_what_is_saved_right_after_a_reload_that_was_asked_for_comes_into_force(following: Following) -> None:
+    """Also where it says what it said before that: the file and what is in force differed for good."""
+    following.turn_for(4.0 * QUIET_S)  # the watcher has seen what the file says
+    for _ in range(3):
+        following.file.write_text(following.ON + NEW)
+        assert following.ask() == ""
+        following.file.write_text(following.ON)
+        following.turn_until(lambda: following.state.config.text == following.ON, "what the file says")
+
+
+def test_a_save_that_says_what_is_in_force_switches_nothing(following: Following) -> None:
+    os.utime(following.file)
+    following.turn_for(6.0 * QUIET_S)
+    following.file.write_text("")
+    following.file.write_text(following.ON)
+    following.turn_for(6.0 * QUIET_S)
+    assert (following.switches, following.refused) == (0, [])
+
+
+def test_where_no_thread_can_be_started_a_reload_is_refused_and_the_next_one_is_not(
+    following: Following, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended the daemon."""
+    with monkeypatch.context() as full:
+        full.setattr(threading.Thread, "start", no_thread)
+        following.file.write_text(following.ON + NEW)
+        said = following.ask()
+    assert said.startswith(f"{following.file}: cannot be read: no thread can be started; free memory, or raise")
+    assert following.refused == [f"configuration refused, nothing changed: {said}"]
+    assert following.ask() == ""
+
+
+def test_a_file_for_which_there_is_no_thread_yet_is_looked_at_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as full:
+        full.setattr(threading.Thread, "start", no_thread)
+        following = Following(tmp_path / "lab.toml")
+        following.reload.turn()
+        following.file.write_text(following.ON + NEW)
+    following.turn_until(lambda: following.state.config.config.controller.law == "tdpa", "what was saved")
+    following.reload.close()
+
+
+def no_thread(_: threading.Thread) -> None:
+    raise RuntimeError("can't start new thread")
 
 
 def test_links_that_lead_in_a_circle_are_no_file_until_they_lead_to_one(tmp_path: Path) -> None:

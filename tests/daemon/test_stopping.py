@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
 
 from hapticd.config.loading import parse
 from hapticd.supervisor import daemon as supervising
-from tests.daemon.running import Daemon
+from tests.daemon.running import Daemon, gone, wait_until
 from tests.daemon.test_deaths import PRESSED, nothing_left, pressing
+from tests.faults.rig import Rig
 
 DRIVERS = '''
 """A device that is let go of slowly, and one that hangs while its force is ramped out."""
@@ -127,3 +129,22 @@ def test_a_force_that_the_loop_could_not_take_away_is_taken_away_from_outside(
         assert daemon.wait_exit() == 1, daemon.output()
         assert f"the control loop could not take the force away{said}\n" in daemon.output()
         assert nothing_left(daemon)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_who_asks_a_daemon_to_end_again_and_again_does_not_keep_it_from_taking_the_force_away(number: int) -> None:
+    """Where the loop hangs in the driver of a lost device: a second Ctrl-C ended the daemon, and the force stayed."""
+    with Rig() as rig:
+        rig.pressed()
+        rig.order("hang-disable")
+        wait_until(lambda: "device lost" in rig.daemon.output(), "the loss of the device")
+        control = rig.daemon.control_pid()
+
+        def ended() -> bool:
+            rig.daemon.process.send_signal(number)
+            time.sleep(0.05)
+            return rig.daemon.process.poll() is not None
+
+        wait_until(ended, "the end of the daemon")
+        assert rig.felt().force_n == 0.0
+        wait_until(lambda: gone(control), "the end of the loop")

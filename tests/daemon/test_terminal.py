@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from hapticd.client.commands import command
+from hapticd.supervisor import terminal as supervising
 from tests.daemon.running import HAPTICD, PATIENCE_S, wait_until
 from tests.daemon.terminal import Terminal
 
@@ -52,6 +54,24 @@ def test_at_a_terminal_too_sighup_from_a_person_is_a_reload(terminal: Terminal) 
         os.kill(pid, signal.SIGHUP)
     terminal.until("goes on")
     assert command("status")["status"]["armed"]
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EPERM])
+def test_a_terminal_that_cannot_be_opened_is_not_closed(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SIGHUP from a person ended a daemon that was out of descriptors."""
+    why = [0]
+
+    def opened(*_: object) -> int:
+        if why[0]:
+            raise OSError(why[0], os.strerror(why[0]))
+        return os.dup(0)
+
+    monkeypatch.setattr(os, "open", opened)
+    started_at = supervising.Terminal()
+    why[0] = number
+    assert not started_at.closed()
+    why[0] = errno.ENXIO
+    assert started_at.closed()
 
 
 def test_a_daemon_under_nohup_outlives_its_terminal(laboratory: Path) -> None:

@@ -8,6 +8,7 @@ import io
 import json
 import os
 import stat
+import threading
 import time
 from contextlib import closing
 from pathlib import Path
@@ -29,6 +30,7 @@ from hapticd.tick.event import EventCode, LoopEvent
 from hapticd.tick.record import RecordLayout
 from hapticd.trace import DriverTrace
 from tests.daemon.running import wait_until
+from tests.daemon.test_flood import descriptors
 
 RATE_HZ = 1000.0
 LAYOUT = RecordLayout(2, True, 8)
@@ -289,6 +291,28 @@ def test_a_record_for_which_there_is_no_descriptor_left_does_not_end_the_daemon(
         recorder.begin(EVENT, 1e9, shared, RATE_HZ, header())
     assert "Too many open files; raise the limit of open files (ulimit -n" in recorder.turn(keep=2)
     assert recorder.turn(keep=2) == ""
+
+
+def test_a_record_for_which_no_thread_can_be_started_is_told_and_the_next_one_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended the daemon."""
+    recorder = FaultRecorder(tmp_path)
+
+    def refuse(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with closing(SharedMemory(LAYOUT, RATE_HZ)) as shared:
+        extend(shared, 100, 0)
+        held = descriptors(os.getpid())
+        with monkeypatch.context() as full:
+            full.setattr(threading.Thread, "start", refuse)
+            recorder.begin(EVENT, 1e9, shared, RATE_HZ, header())
+            assert recorder.close(5, 10.0).startswith("fault record not written: no thread can be started; free memory")
+        assert descriptors(os.getpid()) == held
+        recorder.begin(EVENT, 1e9, shared, RATE_HZ, header())
+        assert recorder.close(5, 10.0) == ""
+    assert recorder.written == 1
 
 
 def test_the_command_lists_shows_and_exports(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import resource
 import socket as sockets
@@ -163,6 +164,36 @@ def test_the_memory_is_looked_at_also_while_no_one_comes_or_goes_and_no_thread_i
         monkeypatch.setattr(bound._memory, "turn", look)
         wait_until(lambda: len(looks) > 2, "a third look")
     assert set(threading.enumerate()) <= before
+
+
+def test_a_look_that_fails_ends_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without it ZeroMQ stood still once a thousand had come and gone, and no `disarm` was heard any more."""
+    looks: list[float] = []
+
+    def look(now_s: float) -> Culprits:
+        looks.append(now_s)
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    with bounded() as (bound, _, where):
+        monkeypatch.setattr(bound._memory, "turn", look)
+        wait_until(lambda: len(looks) > 2, "a third look")
+        with sockets.create_connection(where):
+            wait_until(lambda: any(bound._endpoints.values()), "news of the connection")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_thread_that_ended_before_its_time_does_not_keep_the_context(monkeypatch: pytest.MonkeyPatch) -> None:
+    def look(_now_s: float) -> Culprits:
+        raise ZeroDivisionError
+
+    with bounded() as (bound, socket, _):
+        monkeypatch.setattr(bound._memory, "turn", look)
+        bound._thread.join()
+        socket.close(0)
+        bound.close()
+        closed = bound._news.closed
+        bound._news.close(0)  # or the end of the context waits
+    assert closed
 
 
 def test_few_descriptors_are_said_when_no_more_can_be_had(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,6 +27,30 @@ def test_a_process_has_more_than_a_megabyte_and_less_than_the_computer() -> None
     assert 1 << 20 < resident_bytes() < 1 << 40
 
 
+WITHOUT_DESCRIPTORS = """
+import resource
+from hapticd.keys.memory import MemoryBound, resident_bytes
+bound = MemoryBound()
+resource.setrlimit(resource.RLIMIT_NOFILE, (0, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+print(bound.turn(0.0).name)
+"""
+
+
+def test_a_process_without_a_descriptor_to_spare_knows_what_it_has() -> None:
+    done = subprocess.run([sys.executable, "-c", WITHOUT_DESCRIPTORS], capture_output=True, text=True, check=True)
+    assert done.stdout == "NO_ONE\n"
+
+
+def test_a_process_that_another_one_forked_looks_at_its_own_memory() -> None:
+    code = (
+        "import os; from hapticd.keys.memory import resident_bytes; before = resident_bytes(); child = os.fork()\n"
+        "if not child: taken = bytearray(64 << 20); taken[::4096] = bytes([1]) * len(taken[::4096])\n"
+        "if not child: os._exit(resident_bytes() - before < 60 << 20)\n"
+        "assert os.waitpid(child, 0)[1] == 0"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_within_the_bound_no_connection_is_ended(held: list[int]) -> None:
     bound = MemoryBound(BOUND)
     held.append(BOUND)
