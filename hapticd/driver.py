@@ -225,6 +225,8 @@ class Driver(ABC, Generic[OptionsT]):
     def enable(self) -> None:
         """Let the device take forces; the force is zero until the first write.
 
+        One that fails halfway is disabled again: where a device has two motors, the first may hold already.
+
         Raises:
             DriverStateError: not open.
             DriverError: the device refuses, for example while it is not calibrated; or `_enable` raised what is no such
@@ -233,8 +235,12 @@ class Driver(ABC, Generic[OptionsT]):
         if self.state is DriverState.CLOSED:
             raise DriverStateError("enable: the device is not open")
         if self.state is DriverState.OPEN:
-            with naming(type(self), "_enable"):
-                self._enable()
+            try:
+                with naming(type(self), "_enable"):
+                    self._enable()
+            except BaseException:
+                self.disable()
+                raise
             self.state = DriverState.ENABLED
 
     def read(self) -> Sample:

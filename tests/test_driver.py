@@ -111,6 +111,35 @@ def test_what_a_hook_raises_names_driver_hook_and_place(monkeypatch: pytest.Monk
     assert driver.state is (DriverState.CLOSED if hook == "_open" else DriverState.OPEN)
 
 
+class TwoMotors(Loopback):
+    """The second of two motors refuses, with the first enabled already."""
+
+    def __init__(self, clings: bool) -> None:
+        super().__init__(SimulationOptions(), PERIOD_S)
+        self.clings = clings
+        self.enabled = 0
+
+    def _enable(self) -> None:
+        self.enabled = 1
+        raise DeviceProtocolError("motor 2 refuses")
+
+    def _disable(self) -> None:
+        if self.clings:
+            raise DeviceTimeoutError("motor 1 does not answer")
+        self.enabled = 0
+
+
+@pytest.mark.parametrize("clings", [False, True])
+def test_a_device_that_was_enabled_halfway_is_disabled_again(clings: bool) -> None:
+    """The first motor stayed enabled, and to disarm did nothing, since nothing had been armed."""
+    with TwoMotors(clings) as driver:
+        with pytest.raises(DeviceProtocolError, match="motor 2 refuses"):
+            driver.enable()
+        assert driver.state is DriverState.OPEN
+        assert (driver.enabled, driver.force_left) == ((1, "motor 1 does not answer") if clings else (0, ""))
+        driver.clings = False
+
+
 def test_a_sample_shows_its_fields() -> None:
     sample = Sample(2)
     sample.position_m[1] = 0.25

@@ -14,8 +14,8 @@ and whether it is the contact's own or a hand's: no hand turns within 45 ms. k i
 less where a limit holds force back; the damping B, part of a sample late, hides B dt of the mass. Nothing about the
 device is given. Before the first turn the mass is unknown; a brake that grows with the time is the full one of any mass
 a quarter of a period after the touch, and takes from an arrival where that means to push, not to pull. One decision is
-made a swing, none between. docs/controllers.md has the reasons and the evidence. All of it stands in one module: swings,
-what they say and what comes of it share one state and are read in that order.
+made a swing, none between. docs/controllers.md has the reasons and the evidence. All of it stands in one module: swings
+and what comes of them share one state.
 """
 
 from __future__ import annotations

@@ -195,12 +195,11 @@ class ControlLoop:
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
             if guard.mode is disarmed:
                 late = 0  # what was missed of a force that has been let go counts for no other
-                let_go = driver.state is enabled
-                if let_go:
+                if driver.state is enabled:
                     driver.disable()
                 if self._stopping:
                     return
-                if let_go and driver.force_left:  # whoever opens it anew tries again, and by other ways
+                if driver.force_left:  # also after an arm that failed; whoever opens it anew has other ways
                     raise DeviceProtocolError(f"it may not have let go: {driver.force_left}")
             if words[SUPERVISOR_BEAT] + session.stall_ns < woke_ns:
                 if not self._stalled:

@@ -161,6 +161,25 @@ def test_a_device_that_does_not_let_go_is_given_up(clock: Clock, stops: bool) ->
     assert started.driver.force_left == ""
 
 
+def test_a_device_that_cannot_be_armed_and_does_not_let_go_of_what_it_has_enabled_is_given_up(clock: Clock) -> None:
+    """It stayed with one motor enabled, and to disarm was answered with ok."""
+    started = Started(clock)
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    started.driver.refusal = DeviceFaultError("motor 2 refuses")
+    asked: list[int] = []
+
+    def disable() -> None:
+        asked.append(started.tick_number)
+        if len(asked) == 1:
+            raise DeviceFaultError("motor 1 does not answer")
+
+    started.driver.on_disable = disable
+    with pytest.raises(DeviceProtocolError, match="it may not have let go: motor 1 does not answer"):
+        started.run(lambda _number: None, 300)
+    assert [event.text for event in told(started, EventCode.DISARMED)] == ["stays disarmed: motor 2 refuses"]
+    assert len(asked) == 2, "it is asked once more as it is closed"
+
+
 def test_lateness_of_a_simulated_device_or_of_one_that_is_disarmed_takes_no_force_away(clock: Clock) -> None:
     slow = [*range(1000, 1010)]
     assert late(clock, slow, simulated=True) == []
