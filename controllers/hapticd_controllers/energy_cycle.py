@@ -112,7 +112,7 @@ class State(CycleSums, FeltFields):
 def start(state: Any, params: Any, snapshot: Any) -> None:
     """Take over: damping that was reached and energy that was not dissipated count; a credit does not."""
     state.damping_n_s_per_m = max(0.0, _bounded(snapshot.damping_n_s_per_m))
-    state.uncut_n_s_per_m = state.damping_n_s_per_m
+    state.uncut_n_s_per_m = 0.0
     know_nothing(state, params.force_delay == FORCE_DELAY_ONE_SAMPLE)
     state.was_in_contact = False
     state.lowest_m = snapshot.x_m
