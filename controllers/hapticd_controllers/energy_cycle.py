@@ -125,7 +125,7 @@ def step(state: Any, params: Any, tick: Any) -> float:
     """The contact's own force plus the damping that past cycles called for.  -> force on the device [N]."""
     if params.cap == CAP_FELT_MASS or params.force_delay == FORCE_DELAY_IDENTIFIED:
         feel(state, tick, params.felt_mass_memory)
-    if keep_period(state, tick.dt_s):  # a cap by the first sample's time, before which the device was enabled, is none
+    if keep_period(state, tick.dt_s):  # the first one's may hold the time of enabling: its cap does not stay
         state.damping_n_s_per_m = state.uncut_n_s_per_m
     if tick.in_contact and not state.was_in_contact and params.new_contact != NEW_CONTACT_KEEP:
         begin(state, 0.0)

@@ -41,7 +41,7 @@ _WITHOUT_FORCE = (STOPPED, FAULTED, BRAKE)
 
 LEAST_MARK = 64.0
 MARK_TRAVELS = 8.0
-"""A home that hapticd tells is at so many turns at least, and at so many times the travel [turns].
+"""hapticd sets a home at this many turns at least, and at this many times the travel [turns].
 
 A controller that is switched on counts from within half a turn of 0, whatever it says of its home: no travel leads from
 there to the mark, so that who counts from it was told by hapticd.

@@ -14,7 +14,7 @@ from hapticd_drivers.trace import TraceOptions
 MOST_AXES = 3
 
 MOST_ABSOLUTE_TURNS = 0.5
-"""No encoder tells one turn from the next: a controller that is switched on takes the one that is next to 0."""
+"""No encoder tells one turn from the next: a controller that is switched on assumes the one nearest to 0."""
 
 
 class DrumOptions(Table):

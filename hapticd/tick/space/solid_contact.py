@@ -125,7 +125,7 @@ class SolidContact:
         self._stand()
 
     def take_side(self, held: Proxy | None, x: float, y: float, z: float) -> None:
-        """Once started, hold the device on the side on which another one does that this one comes in the place of."""
+        """Once started in another one's place, hold the device on the side on which that one holds it."""
         proxy = self.solid.proxy
         if held is not None and proxy.touching:
             stays = place_before(proxy, proxy.others, proxy.voxels, held, x, y, z)
