@@ -60,7 +60,7 @@ def test_a_driver_is_measured_beside_the_simulated_device_and_never_pushes(
     with FakeService() as service:
         device = f'accept_no_watchdog = true\n[device.options]\nurl = "{service.url}"'
         found = measured(LAB.format(driver="inverse3", device=device), tmp_path, capsys)
-        assert 0.0 < service.peak_n <= MOST_N
+        assert 0.0 < service.peak_n <= MOST_N * (1.0 + 1e-12)  # the norm of components that were rounded
         assert service.messages > 2 * 200
         assert service.cursor.force_n == [0.0, 0.0, 0.0]
     assert (found["driver"], found["rate_hz"], found["disarmed"]) == ("inverse3", 500.0, "")
