@@ -33,6 +33,8 @@ class CommandHandler:
     def turn(self) -> None:
         """Do what has been asked for, or pass it on to the loop, whose answer comes later."""
         state = self._state
+        if state.recovery.lost:
+            self._settle()
         for request, reply, who in state.commands.receive():
             if request["do"] in KNOWN[2:]:
                 log.info("%s: asked by %s", request["do"], who)
@@ -61,7 +63,10 @@ class CommandHandler:
                     reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
 
     def disarm(self, answer: Answer | None = None) -> None:
-        """Have the loop let go; without a device see that the next one is not armed by itself."""
+        """Have the loop let go; without a device see that the next one is not armed by itself.
+
+        Who asks then hears of it once the force of the lost device has been looked after: it may only be silent.
+        """
         state = self._state
         answer = answer or _unanswered
         if not state.recovery.lost:
@@ -69,7 +74,12 @@ class CommandHandler:
             return
         state.recovery.amend(replace(state.recovery.resume, may_arm=False))
         state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
-        answer("")
+        state.requests.hold(answer)
+        self._settle()  # at once where that can be: by the next turn there may be another loop, with a queue of its own
+
+    def _settle(self) -> None:
+        if self._state.loop.force_seen_to:
+            self._state.requests.settle(self._state.recovery.force_left)
 
     def _status(self) -> dict[str, Any]:
         return self._state.publisher.completed(self._state.status.made.as_map())

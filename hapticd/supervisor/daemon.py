@@ -10,6 +10,7 @@ import time
 from hapticd.config.loading import LoadedConfig
 from hapticd.keys.connections import raise_descriptor_limit
 from hapticd.keys.policy import key_ring
+from hapticd.loop.resume import identity
 from hapticd.paths import CONTROL, TELEMETRY, fault_directory
 from hapticd.supervisor.child import END_TIMEOUT_S, LoopProcess, LoopStart
 from hapticd.supervisor.command_handler import CommandHandler
@@ -92,6 +93,7 @@ class Daemon:
                 on_the_way.pop_all()
             start.go()
             loop = start.wait()
+            self.release.device = identity(loop.info)  # no other takes its place for as long as the daemon runs
             starting = undo.enter_context(contextlib.ExitStack())
             starting.callback(self._end, loop)
             publisher = Publisher(config.config.telemetry, self.lock.directory / TELEMETRY, loop.info, offset_ns, ring)
@@ -106,7 +108,7 @@ class Daemon:
                 config=config,
                 loop=loop,
                 requests=RequestQueue(loop.shared),
-                recovery=Recovery(self._rescue),
+                recovery=Recovery(self._rescue, lambda: self.release.force_left),
                 publisher=publisher,
                 commands=commands,
                 remote=remote,
@@ -207,7 +209,7 @@ class Daemon:
             self._turn()
             await asyncio.sleep(pause_s(state.publisher.flush_due_ns, time.monotonic_ns()))
         state.recovery.stop()
-        state.requests.abandon("the daemon has stopped")
+        state.requests.abandon("the daemon has stopped", self._force_left())
         state.event_log.close(state.config, state.loop, RECORD_TIMEOUT_S)
         return self.exit_code
 
@@ -328,7 +330,7 @@ class Daemon:
         while self._publish():
             pass
         state.event_log.recorder.loop_ended()
-        state.requests.abandon(event.text)
+        state.requests.abandon(event.text, None)  # the next turns look after its force
         state.recovery.begin(state.loop, event.text.removeprefix("device lost: "))
 
     def _loop_lost(self, text: str) -> None:
@@ -339,6 +341,15 @@ class Daemon:
         outcome = self._take_force_away()
         state.tell(EventCode.CONTROL_LOST, f"{text}; {outcome}")
         self.exit_code = 1
+
+    def _force_left(self) -> str:
+        """Why a force may be left as the daemon ends, a line for people; "" when there is none."""
+        state = self.state
+        if state.loop.force_seen_to:
+            return state.recovery.force_left if state.recovery.lost else self.release.force_left
+        if state.loop.exit_code is None:
+            return "the daemon has stopped with its loop still letting go; its log says what came of it"
+        return state.loop.left_behind and f"{state.loop.left_behind}; the daemon's log says what came of it"
 
     def _publish_status(self) -> None:
         state = self.state

@@ -2,9 +2,9 @@
 
 A process of its own, so that a driver that hangs cannot hang the supervisor. It is ready from the start with
 everything imported, since the device holds its last force until it is released, and the start of an interpreter would
-be most of that time. A byte on its standard output says that it is ready; it then reads one from its standard input:
-one means release, none that it is not needed. Where the loop is a real-time process so is this, so that a computer
-with more work than processors does not make it late.
+be most of that time. A byte on its standard output says that it is ready; it then reads its standard input: a mark and
+the identity of the device mean release, nothing that it is not needed. Where the loop is a real-time process so is
+this, so that a computer with more work than processors does not make it late.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from typing import Any
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.driver import Driver
+from hapticd.errors import DeviceNotFoundError
 from hapticd.loop.realtime import become_realtime
+from hapticd.loop.resume import identity
 
 READY_TIMEOUT_S = 10.0
 """How long the helper may take to import what it needs [s]."""
@@ -40,15 +42,25 @@ _NOT_OPENED = "the device could not be opened: "
 _NOT_LET_GO = "the device did not let go: "
 _RELEASED = "the device is without force"
 
+_RELEASE = "!"
+"""What the helper reads before the identity, which may be empty."""
+
 
 class ForceRelease:
     """A helper that is ready.
 
     Args:
         config: names the device; what of it a reload may change is of no matter here.
+
+    Attributes:
+        device: `identity` of the device that has the force: with two of a kind, and no serial number configured,
+            another may be the first to be found. "": any.
+        force_left: why the last release may have left a force, a line for people; "" when it did not.
     """
 
     def __init__(self, config: LoadedConfig) -> None:
+        self.device = ""
+        self.force_left = ""
         self._config = config
         self._helper, self._ready = _start(config), False
         self._ready_by_s = time.monotonic() + READY_TIMEOUT_S
@@ -79,6 +91,12 @@ class ForceRelease:
         Returns:
             What came of it, a line for people.
         """
+        said, released = self._release()
+        self.force_left = "" if released else said
+        return said
+
+    def _release(self) -> tuple[str, bool]:
+        """What came of it, and whether the force is gone."""
         why = "it was not ready in time"
         try:
             if self._helper.poll() is not None:  # somebody has killed it
@@ -87,14 +105,18 @@ class ForceRelease:
                 self._helper.send_signal(signal.SIGCONT)  # somebody may have stopped it
             if self.wait_ready():
                 said = self._by_helper()
-                return f"{said}; without the helper, {self._here()}" if said.startswith(_NOT_LET_GO) else said
+                if not said.startswith(_NOT_LET_GO):
+                    return said, said == _RELEASED
+                here = self._here()
+                return f"{said}; without the helper, {here}", here == _RELEASED
         except Exception as error:  # noqa: BLE001 - whatever keeps a process from being started, a hand holds the device
             why = str(error)
-        return f"the helper that takes the force away did not start ({why}); without it, {self._here()}"
+        here = self._here()
+        return f"the helper that takes the force away did not start ({why}); without it, {here}", here == _RELEASED
 
     def _by_helper(self) -> str:
         try:
-            _, said = self._helper.communicate(b"!", TIMEOUT_S)
+            _, said = self._helper.communicate(_encoded(self.device), TIMEOUT_S)
         except subprocess.TimeoutExpired:
             return _NO_ANSWER
         return said.decode(errors="replace").strip() if self._helper.returncode else _RELEASED
@@ -105,7 +127,7 @@ class ForceRelease:
 
         def let_go() -> None:
             try:
-                said[0] = _let_go(self._config.make_driver()) or _RELEASED
+                said[0] = _let_go(self._config.make_driver(), self.device) or _RELEASED
             except Exception as error:  # noqa: BLE001 - a driver is anybody's code
                 said[0] = f"{_NOT_OPENED}{error}"
 
@@ -149,10 +171,20 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
         )
 
 
-def _let_go(driver: Driver[Any]) -> str:
-    """Open the device and take the force away; "" when it is gone, else what was in the way, a line for people."""
-    driver.open()
+def _encoded(device: str) -> bytes:
+    return f"{_RELEASE}{device}".encode(errors="surrogateescape")
+
+
+def _let_go(driver: Driver[Any], device: str) -> str:
+    """Open the device and take the force away; "" when it is gone, else what was in the way, a line for people.
+
+    Raises:
+        DeviceNotFoundError: another device was found; the one meant may still have its force.
+    """
+    found = identity(driver.open())
     driver.close()
+    if device not in ("", found):
+        raise DeviceNotFoundError(f"found {found} instead of {device}")
     return f"{_NOT_LET_GO}{driver.force_left}" if driver.force_left else ""
 
 
@@ -171,9 +203,10 @@ def main() -> int:
         driver = config.make_driver()
         become_realtime(loop.model_copy(update={"realtime": "off" if loop.realtime == "off" else "preferred"}))
         os.write(sys.stdout.fileno(), b"r")
-        if not sys.stdin.buffer.read(1):
+        asked = sys.stdin.buffer.read().decode(errors="surrogateescape")
+        if not asked:
             return 0
-        problem = _let_go(driver)
+        problem = _let_go(driver, asked.removeprefix(_RELEASE))
     except Exception as error:  # noqa: BLE001 - a driver is anybody's code; its exception becomes one line
         problem = f"{_NOT_OPENED}{error}"
     with contextlib.suppress(OSError):

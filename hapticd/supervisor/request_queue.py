@@ -43,6 +43,7 @@ class RequestQueue:
         self._calibrating = False
         self._disarming: deque[tuple[int, Answer]] = deque()  # each by the number of its request
         self._disarmed: deque[tuple[int, Answer]] = deque()  # each by the record that was the newest then
+        self._held: list[Answer] = []  # to disarm, until it is known what became of the force
 
     def submit(self, request: dict[str, Any], answer: Answer, by_ns: int | None = None) -> None:
         """Queue a request; its answer comes from a later `turn`.
@@ -107,9 +108,14 @@ class RequestQueue:
                     for other in waiting:
                         self.submit(other.request, other.answer)
 
-    def abandon(self, why: str) -> None:
-        """Answer all that wait: the loop is gone, and so is its force, which is what disarming asks for."""
-        disarming = [answer for _, answer in (*self._disarmed, *self._disarming)]
+    def abandon(self, why: str, force_left: str | None = "") -> None:
+        """Answer all that wait: the loop is gone; who asked to disarm asks for its force, and hears of that.
+
+        Args:
+            why: the answer to all others.
+            force_left: why the force may still be there; "" when it is gone, None: to be told by `settle`.
+        """
+        self._held += [answer for _, answer in (*self._disarmed, *self._disarming)]
         answers = [one.answer for one in self._waiting]
         if self._posted is not None:
             if self._shared.words[ANSWERED] == self._shared.words[REQUESTS]:
@@ -123,8 +129,22 @@ class RequestQueue:
         self._waiting.clear()
         for answer in answers:
             answer(why)
-        for answer in disarming:
-            answer("")
+        if force_left is not None:
+            self.settle(force_left)
+
+    def hold(self, answer: Answer) -> None:
+        """Have somebody who asks to disarm, while the loop is gone already, wait for `settle`."""
+        self._held.append(answer)
+
+    def settle(self, force_left: str) -> None:
+        """Answer those who asked to disarm: what became of the force of a loop that is gone is known.
+
+        Args:
+            force_left: why it may still be there; "" when it is gone.
+        """
+        held, self._held = self._held, []
+        for answer in held:
+            answer(f"the force may still be there: {force_left}" if force_left else "")
 
     def _drop_expired(self, now_ns: int) -> None:
         """Answer what has waited for too long, at once: who asked is about to stop listening."""

@@ -255,6 +255,19 @@ def test_a_device_that_hangs_is_released_from_outside_and_the_service_ends(recor
 
 
 @anew_where_late
+def test_a_device_that_nobody_can_find_again_is_not_called_one_without_force() -> None:
+    """Another of its kind was let go of, the event said that all was well, and so did the answer to a disarm."""
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        rig.order("swapped")  # for whoever opens it from now on
+        os.kill(rig.daemon.control_pid(), signal.SIGSTOP)
+        answer = rig.ask("disarm")
+        why = "the device could not be opened: found faulty 2 (x) instead of faulty 1 (x)"
+        assert answer == {"ok": False, "text": f"the force may still be there: {why}"}
+        assert str(events_until(subscriber, EventCode.CONTROL_LOST)[-1]["text"]).endswith(f"; {why}")
+        assert rig.daemon.wait_exit() == 1
+
+
+@anew_where_late
 def test_a_helper_that_was_killed_is_replaced_when_it_is_needed_and_outlives_nobody() -> None:
     with contextlib.ExitStack() as stack:
         first, second = (stack.enter_context(Rig()).pressed() for _ in range(2))

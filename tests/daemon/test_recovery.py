@@ -6,6 +6,7 @@ import errno
 import itertools
 import os
 import subprocess
+from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,18 @@ import pytest
 
 from hapticd.config.loading import parse
 from hapticd.errors import DeviceNotFoundError
-from hapticd.loop.memory import DEVICE_LOST, DISARM, DISARMED, FORCE_LEFT, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED
+from hapticd.loop.memory import (
+    DEVICE_LOST,
+    DISARM,
+    DISARMED,
+    FORCE_LEFT,
+    LATCHED,
+    LAW,
+    MAY_ARM,
+    NEXT_SEQ,
+    SKIPPED,
+    SharedMemory,
+)
 from hapticd.loop.resume import ResumeState
 from hapticd.simulation.options import SimulationOptions
 from hapticd.supervisor import recovery
@@ -24,6 +36,7 @@ from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.command_handler import CommandHandler
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.reload import Reload
+from hapticd.supervisor.request_queue import RequestQueue
 from hapticd_drivers.loopback import Loopback
 from tests.daemon.running import wait_until
 
@@ -111,6 +124,7 @@ def test_a_clear_and_a_file_that_is_taken_have_the_device_looked_for_at_once(
         recovery=lost.made,
         reload_asked=[lambda verdict: answered.append(not verdict)] if do == "reload" else [],
         commands=SimpleNamespace(receive=lambda: [({"do": do}, answered.append, "a test")]),
+        loop=SimpleNamespace(force_seen_to=False),
         notifier=Mock(),
         tell=Mock(),
         adopt=Mock(),
@@ -127,6 +141,49 @@ def test_a_clear_and_a_file_that_is_taken_have_the_device_looked_for_at_once(
         wait_until(verdict, "a verdict")
     assert answered == [True]
     assert lost.waits_s(2) == pytest.approx([0.0, 1.0], abs=0.02)
+
+
+@pytest.mark.parametrize("left", ["", "the device did not let go: no answer"])
+def test_who_disarms_a_device_that_is_lost_hears_once_it_is_known_what_became_of_its_force(
+    left: str,
+) -> None:
+    """It was answered with ok at once, with the loop still hanging in its driver and the force on the hand."""
+    made = Recovery(Mock(), lambda: left)
+    made.begin(LOST, "silent")
+    verdicts: list[str] = []
+    asked = [({"do": "disarm"}, lambda _ok, verdict: verdicts.append(verdict), "a test")]
+    stalled: list[bool] = []
+    loop: Any = SimpleNamespace(
+        exit_code=None, force_seen_to=False, stalled=lambda: bool(stalled), kill=lambda: None, info=LOST.info
+    )
+    state: Any = SimpleNamespace(
+        recovery=made,
+        loop=loop,
+        requests=RequestQueue(cast("SharedMemory", SimpleNamespace(words=defaultdict(int)))),
+        commands=SimpleNamespace(receive=lambda: [asked.pop()] if asked else []),
+        arm_hold=Mock(),
+        tell=Mock(),
+    )
+    state.requests.disarm(verdicts.append)
+    state.requests.abandon("device lost", None)  # as it is lost
+    handler = CommandHandler(state)
+
+    def turn() -> None:
+        made.turn(loop, NO_CONFIG)
+        handler.turn()
+        state.requests.turn(1 << 60)
+
+    for _ in range(3):
+        turn()
+    assert verdicts == []
+    assert not made.resume.may_arm
+    stalled.append(True)
+    turn()
+    said = f"the force may still be there: {left}" if left else ""
+    assert verdicts == [said] * 2
+    asked.append(({"do": "disarm"}, lambda _ok, verdict: verdicts.append(verdict), "a test"))
+    turn()
+    assert verdicts == [said] * 3, "by the next turn there may be another loop"
 
 
 @pytest.mark.parametrize(("text", "tries_wanted"), [("[safety]\nmax_force_n = 2.0\n", 2), ("# a remark\n", 1)])

@@ -17,6 +17,8 @@ import pytest
 
 from hapticd.config.loading import parse
 from hapticd.device import DeviceInfo
+from hapticd.loop.resume import identity
+from hapticd.simulation.options import SimulationOptions
 from hapticd.supervisor.child import kill
 from hapticd.supervisor.daemon import Daemon
 from hapticd.supervisor.force_release import READY_TIMEOUT_S, TIMEOUT_S, ForceRelease
@@ -186,3 +188,25 @@ def test_a_driver_that_could_not_take_the_force_away_is_not_called_one_that_did(
     release.close()
     monkeypatch.setattr("sys.executable", "/gone/python")
     assert release.release().endswith("without it, the device did not let go: _disable: OSError: no answer")
+    assert release.force_left.endswith("_disable: OSError: no answer")
+
+
+@pytest.mark.parametrize("helper", [True, False])
+def test_another_device_of_the_same_kind_is_not_taken_for_the_one_with_the_force(
+    release: ForceRelease, monkeypatch: pytest.MonkeyPatch, helper: bool
+) -> None:
+    """With no serial number configured it was opened instead, and the one that hung called without force."""
+    found = identity(Loopback(SimulationOptions(), 1e-3).open())
+    if helper:
+        assert release.wait_ready()
+    else:
+        release.close()
+        monkeypatch.setattr("sys.executable", "/gone/python")
+    release.device = "omega.7 17 (x, y, z)"
+    assert release.release().endswith(f"the device could not be opened: found {found} instead of omega.7 17 (x, y, z)")
+    assert "found" in release.force_left
+    if helper:
+        release.renew()
+    release.device = found
+    assert release.release().endswith("the device is without force")
+    assert release.force_left == ""

@@ -127,6 +127,19 @@ class TestInTheQueue:
         requests.abandon("gone")
         assert sorted(answers) == ["calibrate: gone", "disarm: done"], "there is no force any more"
 
+    @pytest.mark.parametrize("left", ["", "the device did not answer"])
+    def test_who_asked_to_disarm_a_loop_that_is_gone_hears_what_became_of_the_force(
+        self, shared: SharedMemory, left: str
+    ) -> None:
+        """A loop that hung was answered for with ok, where nobody could take its force away."""
+        requests, answers = RequestQueue(shared), Answers()
+        requests.disarm(answers.to("disarm"))
+        requests.submit({"do": "clear"}, answers.to("clear"))
+        requests.abandon("gone", left)
+        requests.settle("told once")
+        said = f"the force may still be there: {left}" if left else "done"
+        assert answers == ["clear: gone", f"disarm: {said}"]
+
     def test_what_a_lost_loop_had_done_before_is_told_as_it_was(self, shared: SharedMemory) -> None:
         requests, answers = RequestQueue(shared), Answers()
         requests.submit({"do": "clear"}, answers.to("clear"))
