@@ -342,10 +342,10 @@ _STATE = Path("/var/lib/hapticd")
 _FAULTS = "faults"
 
 
-def fault_directory(instance: str) -> Path:
-    """Directory in which a daemon of this user keeps the fault records of an instance.
+def state_directory(instance: str) -> Path:
+    """Directory in which a daemon of this user keeps what is to outlive it.
 
-    Below $HAPTICD_STATE_DIR/<instance>, else systemd's $STATE_DIRECTORY, else /var/lib/hapticd/<instance> for root,
+    $HAPTICD_STATE_DIR/<instance>, else systemd's $STATE_DIRECTORY, else /var/lib/hapticd/<instance> for root,
     else $XDG_STATE_HOME/hapticd/<instance>, which is ~/.local/state/hapticd/<instance> where that is not set.
 
     Raises:
@@ -353,8 +353,26 @@ def fault_directory(instance: str) -> Path:
     """
     given = named_directory("STATE", instance)
     if given is not None:
-        return given / _FAULTS
-    return (_STATE / instance if os.geteuid() == 0 else _user_state(instance)) / _FAULTS
+        return given
+    return _STATE / instance if os.geteuid() == 0 else _user_state(instance)
+
+
+def fault_directory(instance: str) -> Path:
+    """Directory in which a daemon of this user keeps the fault records of an instance, below its state directory.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
+    return state_directory(instance) / _FAULTS
+
+
+def hold_file(instance: str) -> Path:
+    """File that is there while a device was let go and not armed since; see `hapticd.supervisor.arm_hold`.
+
+    Raises:
+        ConfigError: the instance's name is none that a directory could have.
+    """
+    return state_directory(instance) / "disarmed"
 
 
 def fault_directories(instance: str) -> list[Path]:

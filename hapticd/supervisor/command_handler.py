@@ -73,6 +73,7 @@ class CommandHandler:
             state.requests.disarm(answer)
             return
         state.recovery.amend(replace(state.recovery.resume, may_arm=False))
+        state.arm_hold.follow_lost(state.loop, state.recovery.resume)
         state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
         state.requests.hold(answer)
         self._settle()  # at once where that can be: by the next turn there may be another loop, with a queue of its own

@@ -6,12 +6,14 @@ import asyncio
 import contextlib
 import signal
 import time
+from dataclasses import replace
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.keys.connections import raise_descriptor_limit
 from hapticd.keys.policy import key_ring
-from hapticd.loop.resume import identity
-from hapticd.paths import CONTROL, TELEMETRY, fault_directory
+from hapticd.loop.resume import FROM_START, identity
+from hapticd.paths import CONTROL, TELEMETRY, fault_directory, hold_file
+from hapticd.supervisor.arm_hold import HELD, ArmHold
 from hapticd.supervisor.child import END_TIMEOUT_S, LoopProcess, LoopStart
 from hapticd.supervisor.command_handler import CommandHandler
 from hapticd.supervisor.commands import CommandSocket
@@ -86,7 +88,9 @@ class Daemon:
             remote = RemoteProcess(self.lock.directory)
             undo.callback(remote.close)
             remote.prepare(config)
-            start = LoopStart(config, self._rescue, wait=True)  # both import what they need at the same time
+            hold = ArmHold(hold_file(instance))
+            resume = replace(FROM_START, may_arm=not hold.held)
+            start = LoopStart(config, self._rescue, resume, wait=True)  # both import what they need at the same time
             with contextlib.ExitStack() as on_the_way:
                 on_the_way.callback(start.end)
                 self.release.wait_ready()  # before there can be a force to take away; if it is not, that is said later
@@ -116,6 +120,7 @@ class Daemon:
                 epoch_offset_ns=offset_ns,
                 status=status,
                 event_log=event_log,
+                arm_hold=hold,
                 notifier=self._notifier,
             )
             starting.pop_all()
@@ -204,6 +209,8 @@ class Daemon:
             log.warning("%s", self._few_descriptors)
         for note in state.loop.info.notes:
             log.warning("%s", note)
+        if state.arm_hold.held and (settings.safety.auto_arm or state.loop.info.simulated):
+            log.warning("%s", HELD)
         self._publish_status()  # a request that has come already is answered by it
         while self.exit_code is None:
             self._turn()
@@ -223,6 +230,8 @@ class Daemon:
             self._look_for_device()
         else:
             self._look_after_loop(now_s)
+        if not self._stopping and self.exit_code is None:
+            self._hold()
         # After it is known whether there is a device: what is asked for then holds for when it is back.
         self._handler.turn()
         if slept_s := self._sleep.slept_s():
@@ -267,6 +276,14 @@ class Daemon:
             if lost:
                 state.tell(EventCode.RING_DROPPED, f"{lost} {what} were overwritten before they were published")
         return len(records)
+
+    def _hold(self) -> None:
+        """Keep for a daemon that is started anew whether the device was let go, before who asked for it hears of it."""
+        state = self.state
+        if state.recovery.lost:
+            state.arm_hold.follow_lost(state.loop, state.recovery.resume)
+        else:
+            state.arm_hold.follow(state.loop, state.status.flags)
 
     def _look_after_loop(self, now_s: float) -> None:
         state = self.state
@@ -339,6 +356,7 @@ class Daemon:
         state.loop.kill()
         state.loop.force_seen_to = True
         outcome = self._take_force_away()
+        state.arm_hold.keep(state.loop)
         state.tell(EventCode.CONTROL_LOST, f"{text}; {outcome}")
         self.exit_code = 1
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.keys.store import KeyRing
+from hapticd.supervisor.arm_hold import ArmHold
 from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.commands import CommandSocket
 from hapticd.supervisor.events import EventLog
@@ -35,6 +36,7 @@ class DaemonState:
         epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
         status: counts, and the status made of them.
         event_log: tells of events.
+        arm_hold: keeps that the device was let go for a daemon that is started anew.
         notifier: tells systemd.
         reload_asked: answers to those who asked for a reload that has not begun.
         stop_reason: why the daemon is to end; "" as long as it is not.
@@ -54,6 +56,7 @@ class DaemonState:
     epoch_offset_ns: int
     status: StatusBuilder
     event_log: EventLog
+    arm_hold: ArmHold
     notifier: Notifier
     reload_asked: list[Answer] = field(default_factory=list)
     stop_reason: str = ""

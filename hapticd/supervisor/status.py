@@ -39,13 +39,14 @@ class StatusBuilder:
 
     Attributes:
         last: the newest tick, None before the first.
+        flags: of the newest tick of the loop that there is, or what it goes on from; 0 where nothing is known.
         rate_hz: measured lately [Hz].
         made: the status as it was made last.
     """
 
     def __init__(self, instance: str, epoch_offset_ns: int, file: Path) -> None:
         self.last: TickRecord | None = None
-        self._flags = 0
+        self.flags = 0
         self._law = 0
         self.rate_hz = 0.0
         self.made = Status()
@@ -77,14 +78,14 @@ class StatusBuilder:
             self._ticks += len(records)
             self.last = records[-1]
             self._ticking = True
-            self._flags = self.last.flags
+            self.flags = self.last.flags
             self._law = self.last.law
 
     def expect(self, resume: ResumeState) -> None:
         """A loop that has not ticked yet goes on from there; where the one before was tared to is forgotten."""
         self._origin_m = {}
         self._ticking = False
-        self._flags = Flag.LATCHED if resume.latched else 0
+        self.flags = Flag.LATCHED if resume.latched else 0
         self._law = resume.law
 
     def follow_clock(self, epoch_offset_ns: int) -> None:
@@ -131,7 +132,7 @@ class StatusBuilder:
         info = loop.info
         if recovery.lost:
             self.expect(recovery.resume)
-        flags = self._flags
+        flags = self.flags
         self.made = Status(
             version=__version__,
             instance=self._instance,

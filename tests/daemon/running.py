@@ -49,10 +49,24 @@ class Daemon:
         environment.pop("WATCHDOG_USEC", None)
         if pythonpath is not None:
             environment["PYTHONPATH"] = str(pythonpath)
-        with self.log.open("w") as log:
-            self.process = subprocess.Popen(
-                [*prefix, HAPTICD, "run", "--config", str(self.config)], env=environment, stderr=log, stdout=log
+        self._prefix = prefix
+        self._environment = environment
+        self.process = self._start()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        with self.log.open("a") as log:
+            return subprocess.Popen(
+                [*self._prefix, HAPTICD, "run", "--config", str(self.config)],
+                env=self._environment,
+                stderr=log,
+                stdout=log,
             )
+
+    def again(self) -> Daemon:
+        """Start it anew once it has ended, as systemd would; returns when it ticks."""
+        self.wait_exit()
+        self.process = self._start()
+        return self.wait_ready()
 
     def __enter__(self) -> Daemon:
         return self

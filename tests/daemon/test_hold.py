@@ -1,0 +1,144 @@
+"""A daemon that is started anew puts no force on that was taken away before, whatever arms by itself."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from hapticd.loop.memory import DISARM
+from hapticd.loop.resume import FROM_START, ResumeState
+from hapticd.supervisor.arm_hold import ArmHold
+from hapticd.tick.event import EventCode
+from hapticd.tick.flags import Flag
+from tests.faults.rig import Rig, anew_where_late, events_until
+
+HELD = "stays disarmed: it was disarmed, or a fault had stopped it, when the daemon before ended"
+
+
+def disarmed(rig: Rig) -> None:
+    assert rig.ask("disarm")["ok"]
+    os.kill(rig.daemon.control_pid(), signal.SIGKILL)
+
+
+def disarmed_and_stopped(rig: Rig) -> None:
+    assert rig.ask("disarm")["ok"]
+    assert rig.ask("stop")["ok"]
+
+
+def disarmed_while_lost(rig: Rig) -> None:
+    with rig.subscriber() as subscriber:
+        rig.order("unplugged")
+        events_until(subscriber, EventCode.DEVICE_LOST)
+        assert rig.ask("disarm")["ok"]
+    os.kill(rig.daemon.process.pid, signal.SIGKILL)
+    rig.mend()
+
+
+def latched(rig: Rig) -> None:
+    with rig.subscriber() as subscriber:
+        rig.order("jump")
+        assert subscriber.until("hapticd/status", latched=True)
+        rig.mend()
+    os.kill(rig.daemon.process.pid, signal.SIGKILL)
+
+
+def hanging(rig: Rig) -> None:
+    os.kill(rig.daemon.control_pid(), signal.SIGSTOP)
+
+
+def armed(rig: Rig) -> None:
+    os.kill(rig.daemon.process.pid, signal.SIGKILL)
+
+
+def armed_after_disarm(rig: Rig) -> None:
+    assert rig.ask("disarm")["ok"]
+    rig.goes_on("arm")
+    assert rig.ask("stop")["ok"]
+
+
+@pytest.mark.parametrize("end", [disarmed, disarmed_and_stopped, disarmed_while_lost, latched, hanging])
+@anew_where_late
+def test_what_was_let_go_stays_so_until_it_is_armed_also_by_a_daemon_that_is_started_anew(end: Any) -> None:
+    """With `safety.auto_arm` it pushed again 5 s after somebody had disarmed it."""
+    with Rig(safety="auto_arm = true") as rig:
+        rig.pressing()
+        assert HELD not in rig.daemon.output()
+        end(rig)
+        rig.daemon.again()
+        assert not rig.ask("status")["status"]["armed"]
+        assert HELD in rig.daemon.output()
+        rig.goes_on("arm")
+        armed(rig)
+        rig.daemon.again()
+        rig.pressing()
+
+
+@pytest.mark.parametrize("end", [armed, armed_after_disarm])
+@anew_where_late
+def test_what_was_armed_arms_itself_again(end: Any) -> None:
+    with Rig(safety="auto_arm = true") as rig:
+        rig.pressing()
+        end(rig)
+        rig.daemon.again()
+        rig.pressing()
+        assert HELD not in rig.daemon.output()
+
+
+def loop(asked: int = 0, simulated: bool = False) -> Any:
+    return SimpleNamespace(info=SimpleNamespace(simulated=simulated), shared=SimpleNamespace(words={DISARM: asked}))
+
+
+class TestTheFile:
+    @pytest.fixture
+    def path(self, tmp_path: Path) -> Path:
+        return tmp_path / "state" / "disarmed"
+
+    def test_it_is_there_as_long_as_the_device_is_held(self, path: Path) -> None:
+        hold = ArmHold(path)
+        for flags, asked, held in (
+            (0, 0, False),  # a device that waits for its first arm was not let go
+            (Flag.ARMED, 0, False),
+            (Flag.RELEASING, 1, True),
+            (0, 1, True),
+            (Flag.ARMED, 1, False),
+            (Flag.LATCHED | Flag.RELEASING, 0, True),
+            (0, 0, True),  # cleared, and not armed yet
+        ):
+            hold.follow(loop(asked), flags)
+            assert (hold.held, path.exists(), ArmHold(path).held) == (held, held, held)
+
+    @pytest.mark.parametrize("resume", [ResumeState(may_arm=False), ResumeState(latched=True)])
+    def test_a_lost_device_that_may_not_arm_itself_is_held(self, path: Path, resume: ResumeState) -> None:
+        hold = ArmHold(path)
+        hold.follow_lost(loop(), FROM_START)
+        assert not hold.held
+        hold.follow_lost(loop(), resume)
+        assert ArmHold(path).held
+
+    def test_a_simulated_device_pushes_on_nobody(self, path: Path) -> None:
+        hold = ArmHold(path)
+        hold.follow(loop(1, simulated=True), 0)
+        hold.keep(loop(simulated=True))
+        assert not path.exists()
+
+    def test_a_directory_that_takes_nothing_is_told_of_once(self, path: Path, caplog: pytest.LogCaptureFixture) -> None:
+        path.parent.touch()
+        hold = ArmHold(path)
+        for _ in range(3):
+            hold.keep(loop())
+        assert hold.held
+        (line,) = caplog.messages
+        assert line.startswith(str(path))
+        assert line.endswith("does not know that the device stays disarmed")
+
+    def test_a_file_that_nobody_can_look_for_holds(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        def refused(_path: Path) -> None:
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr(Path, "lstat", refused)
+        assert ArmHold(path).held
