@@ -27,6 +27,7 @@ class ArmHold:
 
     Attributes:
         held: the device may not be armed without anybody's word.
+        inherited: it has been so since before this daemon.
     """
 
     def __init__(self, path: Path) -> None:
@@ -39,6 +40,7 @@ class ArmHold:
             self.held = True
         else:
             self.held = True
+        self.inherited = self.held
 
     def follow(self, loop: LoopProcess, flags: int) -> None:
         """Keep what the state of a running device says.
@@ -70,6 +72,7 @@ class ArmHold:
         if held == self.held or loop.info.simulated:
             return
         self.held = held
+        self.inherited = False
         try:
             if held:
                 make_directory(self._path.parent, 0o750)

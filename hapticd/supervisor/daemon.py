@@ -209,8 +209,8 @@ class Daemon:
             log.warning("%s", self._few_descriptors)
         for note in state.loop.info.notes:
             log.warning("%s", note)
-        if state.arm_hold.held and (settings.safety.auto_arm or state.loop.info.simulated):
-            log.warning("%s", HELD)
+        for problem in self._problems():
+            log.warning("%s", problem)
         self._publish_status()  # a request that has come already is answered by it
         while self.exit_code is None:
             self._turn()
@@ -369,6 +369,13 @@ class Daemon:
             return "the daemon has stopped with its loop still letting go; its log says what came of it"
         return state.loop.left_behind and f"{state.loop.left_behind}; the daemon's log says what came of it"
 
+    def _problems(self) -> list[str]:
+        """What stands and should be known, each a line."""
+        state = self.state
+        arms_itself = state.config.config.safety.auto_arm or state.loop.info.simulated
+        held = HELD if arms_itself and state.arm_hold.inherited else ""
+        return [problem for problem in (held, self._problem) if problem]
+
     def _publish_status(self) -> None:
         state = self.state
         written = state.event_log.recorder.written
@@ -378,7 +385,7 @@ class Daemon:
             state.recovery,
             written,
             state.commands.refused,
-            self._problem,
+            self._problems(),
             state.remote.counts,
         )
         state.publisher.status(status.as_map())

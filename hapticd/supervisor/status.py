@@ -113,7 +113,7 @@ class StatusBuilder:
         recovery: Recovery,
         fault_records: int,
         requests_refused: int,
-        problem: str,
+        problems: Sequence[str],
         remote: Mapping[str, Any],
     ) -> Status:
         """The status as it is now.
@@ -124,7 +124,7 @@ class StatusBuilder:
             recovery: knows whether there is a device.
             fault_records: written so far.
             requests_refused: on the control socket so far.
-            problem: what stands and should be known, a line; "" when there is nothing.
+            problems: what stands and should be known, each a line.
             remote: what the remote process counted, by the fields of the status.
         """
         self._measure_rate()
@@ -177,7 +177,7 @@ class StatusBuilder:
             realtime=loop.realtime,
             warnings=(
                 *((_missing(recovery),) if recovery.lost else ()),
-                *((problem,) if problem else ()),
+                *problems,
                 *loop.warnings,
                 *info.notes,
             ),

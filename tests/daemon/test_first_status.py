@@ -83,7 +83,7 @@ def record(flags: Flag) -> TickRecord:
 
 
 def made(status: StatusBuilder, loop: LoopProcess, recovery: Recovery) -> Status:
-    return status.make(CONFIG, loop, recovery, 0, 0, "", {})
+    return status.make(CONFIG, loop, recovery, 0, 0, (), {})
 
 
 def test_a_device_is_calibrated_once_a_record_says_so_and_not_before(loop: LoopProcess) -> None:

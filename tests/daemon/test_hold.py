@@ -70,9 +70,11 @@ def test_what_was_let_go_stays_so_until_it_is_armed_also_by_a_daemon_that_is_sta
         assert HELD not in rig.daemon.output()
         end(rig)
         rig.daemon.again()
-        assert not rig.ask("status")["status"]["armed"]
+        status = rig.ask("status")["status"]
+        assert (status["armed"], HELD in str(status["warnings"])) == (False, True)
         assert HELD in rig.daemon.output()
         rig.goes_on("arm")
+        assert HELD not in str(rig.ask("status")["status"]["warnings"])
         armed(rig)
         rig.daemon.again()
         rig.pressing()
