@@ -9,6 +9,7 @@ memory that it takes, and its connection ended.
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import logging
 import os
@@ -273,8 +274,18 @@ def _shut(descriptor: int, endpoint: str) -> None:
 
 @contextlib.contextmanager
 def _held(descriptor: int) -> Iterator[sockets.socket]:
-    """What a descriptor leads to now, whatever becomes of the descriptor."""
-    own = os.dup(descriptor)
+    """What a descriptor leads to now, whatever becomes of the descriptor; where no other is free, by its own number."""
+    try:
+        own = os.dup(descriptor)
+    except OSError as error:
+        if error.errno != errno.EMFILE:
+            raise
+        connection = sockets.socket(fileno=descriptor)  # what fills them all has to be ended without one
+        try:
+            yield connection
+        finally:
+            connection.detach()
+        return
     try:
         connection = sockets.socket(fileno=own)
     except OSError:  # no socket any more

@@ -21,6 +21,7 @@ from hapticd.keys import connections
 from hapticd.keys.connections import DESCRIPTORS, ConnectionBound, descriptor_of, local_peer
 from hapticd.keys.memory import Culprits
 from tests.daemon.test_flood import descriptors, flood
+from tests.remote.test_no_room import no_descriptor_left
 from tests.telemetry.sockets import wait_until
 
 MOST = 20
@@ -133,6 +134,24 @@ def test_of_an_endpoint_that_is_given_up_nothing_is_kept() -> None:
         wait_until(lambda: any(bound._endpoints.values()), "news of the connection")
         socket.unbind(socket.getsockopt_string(zmq.LAST_ENDPOINT))
         wait_until(lambda: not any(bound._endpoints.values()), "news of its end")
+
+
+def test_a_connection_is_shut_also_where_no_descriptor_is_free(tmp_path: Path) -> None:
+    """It was left open, in the moment in which most of them have to go."""
+    path = tmp_path / "here"
+    with sockets.socket(sockets.AF_UNIX) as listening, sockets.socket(sockets.AF_UNIX) as theirs:
+        listening.bind(str(path))
+        listening.listen()
+        theirs.connect(str(path))
+        ours, _ = listening.accept()
+        with ours, no_descriptor_left():
+            connections._shut(ours.fileno(), "ipc:///elsewhere")
+            kept = not ended(theirs)
+            connections._shut(ours.fileno(), f"ipc://{path}")
+            assert kept
+            assert ended(theirs)
+            assert local_peer(ours.fileno()) == f"user {os.geteuid()}, process {os.getpid()}"
+            ours.getsockname()  # its descriptor is ZeroMQ's to close
 
 
 def test_the_kernel_knows_who_is_at_the_other_end(tmp_path: Path) -> None:
