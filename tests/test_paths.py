@@ -240,6 +240,27 @@ def test_what_lies_in_the_place_of_the_lock_is_no_daemon_and_stays_as_it_is(
     assert os.path.lexists(lock)
 
 
+def test_a_lock_in_use_is_not_old(user: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What cleans /tmp up would remove it after some days, and the daemon would end."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "lab"))
+    lock = InstanceLock("left")
+    os.utime(lock.directory / "lock", (0.0, 0.0))
+    assert lock.keep()
+    assert (lock.directory / "lock").stat().st_mtime > 0.0
+    lock.close()
+
+
+@pytest.mark.parametrize("place", ["lab", "lab/left"])
+def test_a_daemon_says_what_lies_in_the_place_of_its_directory(
+    user: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(user / "lab"))
+    (user / place).parent.mkdir(exist_ok=True)
+    (user / place).touch()
+    with pytest.raises(InstanceError, match=r"lab/left: .*; set HAPTICD_RUNTIME_DIR to a directory of yours"):
+        InstanceLock("left")
+
+
 def test_a_daemon_that_cannot_write_its_lock_says_which_file_and_leaves_none(
     user: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import zmq
 
+from hapticd.own_file import OwnFile
+
 MODE = 0o660
 """Of the socket's file; its directory decides further who may reach it."""
 
 
-def bind_local(socket: zmq.Socket[bytes], path: Path) -> None:
+def bind_local(socket: zmq.Socket[bytes], path: Path) -> OwnFile:
     """Bind a socket to a path.
 
     The umask is the whole process's, so that a file that another thread makes in this moment is for no more than
@@ -20,6 +22,9 @@ def bind_local(socket: zmq.Socket[bytes], path: Path) -> None:
     Args:
         socket: any kind that binds.
         path: where its file is to lie.
+
+    Returns:
+        The file, which ZeroMQ leaves behind.
 
     Raises:
         ZMQError: it cannot be bound.
@@ -30,4 +35,10 @@ def bind_local(socket: zmq.Socket[bytes], path: Path) -> None:
         socket.bind(f"ipc://{path}")
     finally:
         os.umask(before)
-    path.chmod(MODE)  # a directory's default list of rights takes the place of a umask
+    file = OwnFile(path, path.lstat())
+    try:
+        path.chmod(MODE)  # a directory's default list of rights takes the place of a umask
+    except OSError:
+        file.unlink()
+        raise
+    return file

@@ -12,6 +12,7 @@ from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.local_bind import bind_local
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
+from hapticd.own_file import OwnFile
 from hapticd.paths import why_refused
 
 _LAST_WORDS_MS = 100
@@ -52,7 +53,7 @@ class BoundSocket:
     ) -> None:
         if path.exists() and not path.is_socket():  # ZeroMQ would put its socket over it
             raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
-        self._path = path
+        self._file: OwnFile | None = None
         self._watch_only = watch_only
         self._names: dict[str, str] = {}
         self._gate: CurveServer | None = None
@@ -64,7 +65,7 @@ class BoundSocket:
         self.socket.setsockopt(zmq.MAXMSGSIZE, largest)
         endpoint = f"ipc://{path}"
         try:
-            bind_local(self.socket, path)
+            self._file = bind_local(self.socket, path)
             if tcp is not None:
                 endpoint, key = tcp
                 self._bind_tcp(endpoint, key, ring)
@@ -107,7 +108,8 @@ class BoundSocket:
         if self._gate is not None:
             self._gate.close()
         self._context.term()
-        self._path.unlink(missing_ok=True)
+        if self._file is not None:
+            self._file.unlink()
 
     def _bind_tcp(self, endpoint: str, key: str, ring: KeyRing | None) -> None:
         if ring is None:

@@ -21,6 +21,7 @@ from hapticd.keys.heartbeat import expect_signs_of_life
 from hapticd.keys.local_bind import bind_local
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
+from hapticd.own_file import OwnFile
 from hapticd.paths import why_refused
 
 _LARGEST_REQUEST = 1 << 13  # bytes of a frame
@@ -64,7 +65,7 @@ class CommandSocket:
     def __init__(self, path: Path, tcp: str | None = None, ring: KeyRing | None = None) -> None:
         if path.exists() and not path.is_socket():  # ZeroMQ would put its socket over it
             raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
-        self._path = path
+        self._file: OwnFile | None = None
         self._names = _names(ring)
         self.refused = 0
         self._gate: CurveServer | None = None
@@ -76,7 +77,7 @@ class CommandSocket:
         self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_REQUEST)
         self._socket.setsockopt(zmq.RCVHWM, _MOST_UNREAD)
         try:
-            bind_local(self._socket, path)
+            self._file = bind_local(self._socket, path)
         except (zmq.ZMQError, OSError) as error:
             self.close()
             raise InstanceError(f"ipc://{path}: {why_refused(error.errno)}") from error
@@ -119,7 +120,8 @@ class CommandSocket:
         if self._gate is not None:
             self._gate.close()
         self._context.term()
-        self._path.unlink(missing_ok=True)
+        if self._file is not None:
+            self._file.unlink()
 
     def _bind_tcp(self, endpoint: str, ring: KeyRing | None) -> None:
         try:

@@ -85,7 +85,7 @@ class Daemon:
             undo.callback(self.lock.close)
             self.release = ForceRelease(config)
             undo.callback(self.release.close)
-            remote = RemoteProcess(self.lock.directory)
+            remote = RemoteProcess(self.lock)
             undo.callback(remote.close)
             remote.prepare(config)
             hold = ArmHold(hold_file(instance))
@@ -132,6 +132,7 @@ class Daemon:
         self._device_lost: LoopEvent | None = None
         self._problem = ""
         self._stopping = False
+        self._stop_code = 0
         self._sleep = SleepWatch()
         self._stop_by_s = 0.0
 
@@ -142,21 +143,23 @@ class Daemon:
         finally:
             self._undo.close()  # where it did not come as far as to serve
 
-    def stop(self, why: str) -> None:
+    def stop(self, why: str, exit_code: int = 0) -> None:
         """Let the loop ramp the force out, and end.
 
         Args:
             why: who or what wants it.
+            exit_code: of the daemon, where nothing goes wrong meanwhile.
         """
         if self._stopping:
             return
         state = self.state
         self._stopping = True
+        self._stop_code = exit_code
         self._stop_by_s = time.monotonic() + STOP_TIMEOUT_S
         state.notifier.send("STOPPING=1")
         state.tell(EventCode.STOPPING, f"{why}: ramping the force out")
         if state.recovery.lost:
-            self.exit_code = 0
+            self.exit_code = exit_code
         state.loop.stop()
 
     def _end(self, loop: LoopProcess) -> None:
@@ -245,6 +248,7 @@ class Daemon:
         state.requests.turn(state.loop.reader.fetched)
         state.event_log.turn(state.config, state.loop)
         if now_s >= state.status_due_s:
+            self._look_after_lock()
             self._look_after_helper()
             self._follow_clock()
         news = state.event_log.news or state.remote.news
@@ -301,6 +305,16 @@ class Daemon:
         elif self._stopping and now_s > self._stop_by_s:
             self._loop_lost(f"the control loop did not stop within {STOP_TIMEOUT_S:g} s")
 
+    def _look_after_lock(self) -> None:
+        """End where the way to this daemon was taken away: it could be neither disarmed nor told from a second one."""
+        if not self._stopping and not self.lock.keep():
+            log.error(
+                "%s: this daemon's lock there was removed or replaced: commands may not reach it, and a second daemon "
+                "could start beside it, so it ends; keep other programs off that directory, and start hapticd again",
+                self.lock.directory,
+            )
+            self.stop("the runtime directory was taken away", exit_code=1)
+
     def _look_after_helper(self) -> None:
         """Tell when no helper is ready to take the force away; the status says so as long as it is so."""
         before, self._problem = self._problem, self.release.problem if self.exit_code is None else ""
@@ -336,7 +350,7 @@ class Daemon:
         left = state.loop.left_behind
         if self._stopping and not left:
             log.info("stopped")
-            self.exit_code = 0
+            self.exit_code = self._stop_code
         else:
             self._loop_lost(left or f"the loop's process ended with exit code {state.loop.exit_code}")
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import time
 from pathlib import Path
 
 from hapticd.errors import InstanceError
+from hapticd.own_file import OwnFile
 from hapticd.paths import LOCK, make_runtime_directory, open_lock, why_refused
 
 LOOK_S = 0.2
 """How long a client that looks whether a daemon lives may hold the lock, which takes it microseconds [s]."""
+
+TOUCH_S = 3600.0
+"""How often the lock is marked as in use, for what removes old files from /tmp [s]."""
 
 
 class InstanceLock:
@@ -42,10 +47,11 @@ class InstanceLock:
                 f"instance {instance!r} is already running (process {holder or 'unknown'}); stop it, or choose "
                 "another with --instance"
             ) from error
-        if not path.exists() or path.stat().st_ino != os.fstat(self._descriptor).st_ino:
+        self._file = OwnFile(path, os.fstat(self._descriptor))
+        if not self._file.is_in_place():
             os.close(self._descriptor)
             raise InstanceError(f"instance {instance!r} is just being stopped or started by another daemon; try again")
-        self._path = path
+        self._touch_due_s = 0.0
         try:
             os.ftruncate(self._descriptor, 0)
             os.pwrite(self._descriptor, f"{os.getpid()}\n".encode(), 0)
@@ -53,9 +59,18 @@ class InstanceLock:
             self.close()
             raise InstanceError(f"{path}: {why_refused(error.errno)}") from error
 
+    def keep(self) -> bool:
+        """Whether the lock still lies where others look for it; without, nothing keeps a second daemon away."""
+        now_s = time.monotonic()
+        if now_s >= self._touch_due_s:
+            self._touch_due_s = now_s + TOUCH_S
+            with contextlib.suppress(OSError):
+                os.utime(self._descriptor)
+        return self._file.is_in_place()
+
     def close(self) -> None:
-        """Give the instance back and leave nothing behind."""
-        self._path.unlink(missing_ok=True)
+        """Give the instance back and leave nothing behind; what another has put in its place stays."""
+        self._file.unlink()
         os.close(self._descriptor)
 
 

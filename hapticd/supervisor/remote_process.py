@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import msgpack
@@ -24,6 +23,7 @@ from hapticd.paths import SCENE, STATE
 from hapticd.remote.delays import DelayHistogram
 from hapticd.remote.settings import LARGEST_PACKET, SETTINGS, RemoteSettings
 from hapticd.supervisor.child import LoopProcess
+from hapticd.supervisor.lock import InstanceLock
 
 READY_TIMEOUT_S = 10.0
 """How long it may take to bind its sockets when the daemon starts [s]."""
@@ -48,17 +48,17 @@ class RemoteProcess:
     ends.
 
     Args:
-        directory: runtime directory of the instance.
+        lock: of the instance, in whose directory its sockets lie.
 
     Attributes:
         counts: what it counted, by the fields of the status.
         news: a client has come or gone since this was last set to False.
     """
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, lock: InstanceLock) -> None:
         self.counts: dict[str, Any] = _none_of([])
         self.news = False
-        self._directory = directory
+        self._lock = lock
         self._ports: list[PortLimits] = []
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: socket.socket | None = None
@@ -96,7 +96,7 @@ class RemoteProcess:
             cpus -= os.sched_getaffinity(loop.process.pid)
         self._settings = RemoteSettings(
             version=version.__version__,
-            directory=str(self._directory),
+            directory=str(self._lock.directory),
             scene_tcp=remote.scene_tcp,
             state_tcp=remote.state_tcp,
             ring=ring,
@@ -229,8 +229,8 @@ class RemoteProcess:
                 self._process.wait(_END_TIMEOUT_S)
         self._process = self._channel = None
         self.counts = _none_of(self._ports)
-        for name in (SCENE, STATE):
-            (self._directory / name).unlink(missing_ok=True)
+        for name in (SCENE, STATE) if self._lock.keep() else ():  # else they may be another daemon's
+            (self._lock.directory / name).unlink(missing_ok=True)
 
 
 def _none_of(ports: Sequence[PortLimits]) -> dict[str, Any]:

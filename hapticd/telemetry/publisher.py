@@ -23,6 +23,7 @@ from hapticd.keys.local_bind import bind_local
 from hapticd.keys.policy import stays_here
 from hapticd.keys.server import CurveServer
 from hapticd.keys.store import KeyRing
+from hapticd.own_file import OwnFile
 from hapticd.telemetry import wire
 from hapticd.telemetry.clock import timestamp_s
 from hapticd.telemetry.wire import INVALID, Inputs, Map, Topic
@@ -115,7 +116,7 @@ class Publisher:
         self._high_water = config.send_high_water
         self.reconfigure(config)
 
-        self._ipc_path: Path | None = None
+        self._file: OwnFile | None = None
         self._gate: CurveServer | None = None
         self._context = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.XPUB)
@@ -246,9 +247,9 @@ class Publisher:
         if self._gate is not None:
             self._gate.close()
         self._context.term()  # returns when ZeroMQ's thread has let go of the path
-        if self._ipc_path is not None:
-            self._ipc_path.unlink(missing_ok=True)
-            self._ipc_path = None
+        if self._file is not None:
+            self._file.unlink()
+            self._file = None
 
     def _add_tick(self, record: TickRecord, timestamp: float, contacts: Sequence[WallRecord]) -> None:
         if self._batch_due_ns is None:
@@ -341,10 +342,9 @@ class Publisher:
             raise InstanceError(f"ipc://{path}: a file that is no socket is in the way; remove it")
         endpoint = f"ipc://{path}"
         try:
-            bind_local(self._socket, path)
-        except zmq.ZMQError as error:
+            self._file = bind_local(self._socket, path)
+        except (zmq.ZMQError, OSError) as error:
             raise _refused(endpoint, error) from error
-        self._ipc_path = path
         self.endpoints.append(endpoint)
 
     def _bind(self, endpoint: str) -> None:
@@ -355,7 +355,7 @@ class Publisher:
         self.endpoints.append(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
 
 
-def _refused(endpoint: str, error: zmq.ZMQError) -> InstanceError:
+def _refused(endpoint: str, error: zmq.ZMQError | OSError) -> InstanceError:
     return InstanceError(f"{endpoint}: {_advice(error.errno or 0)}")
 
 

@@ -72,3 +72,22 @@ def test_a_path_that_is_refused_leaves_the_umask_as_it_was(opened: Open, short_p
     with pytest.raises(InstanceError):
         opened(short_path / "nowhere")
     assert os.umask(umask) == umask
+
+
+@pytest.mark.parametrize("opened", [CommandSocket, telemetry, remote])
+def test_a_directory_that_is_a_file_is_refused_by_name(opened: Open, short_path: Path) -> None:
+    """It ended in a NotADirectoryError."""
+    short_path.touch()
+    with pytest.raises(InstanceError, match=f"ipc://{short_path}/socket: "):
+        opened(short_path / "socket")
+    assert short_path.is_file()
+
+
+@pytest.mark.parametrize("opened", [CommandSocket, telemetry, remote])
+def test_only_its_own_file_is_removed_in_the_end(opened: Open, short_path: Path) -> None:
+    first = opened(short_path)
+    second = opened(short_path)  # ZeroMQ puts it over the first
+    first.close()
+    assert short_path.is_socket()
+    second.close()
+    assert not short_path.exists()

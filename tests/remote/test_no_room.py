@@ -19,6 +19,7 @@ from hapticd.config.walls import MAX_WALLS
 from hapticd.loop.memory import SharedMemory
 from hapticd.simulation.options import SimulationOptions
 from hapticd.supervisor import remote_process
+from hapticd.supervisor.lock import InstanceLock
 from hapticd.supervisor.remote_process import RemoteProcess
 from hapticd.tick.record import RecordLayout
 from hapticd_drivers.loopback import Loopback
@@ -35,6 +36,14 @@ def loop() -> Iterator[Any]:
     shared.close()
 
 
+@pytest.fixture
+def lock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[InstanceLock]:
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
+    lock = InstanceLock("lab")
+    yield lock
+    lock.close()
+
+
 @contextlib.contextmanager
 def no_descriptor_left() -> Iterator[None]:
     """A process, this one, that has as many files open as it may."""
@@ -49,10 +58,10 @@ def no_descriptor_left() -> Iterator[None]:
 
 
 def test_one_that_cannot_be_started_is_told_tried_again_later_and_ends_no_daemon(
-    loop: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    loop: Any, lock: InstanceLock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = SimpleNamespace(now_s=1000.0)
-    remote = RemoteProcess(tmp_path)
+    remote = RemoteProcess(lock)
     tries = []
 
     def refuse(*_arguments: object, **_more: object) -> None:
@@ -71,17 +80,17 @@ def test_one_that_cannot_be_started_is_told_tried_again_later_and_ends_no_daemon
     assert "cannot be started (Resource temporarily unavailable); it is started again" in told[-1]
     assert len(told) == 5
     monkeypatch.setattr(remote, "_due_s", 0.0)
-    wait_until(lambda: not list(remote.turn()) and (tmp_path / "scene").exists(), "its sockets")
+    wait_until(lambda: not list(remote.turn()) and (lock.directory / "scene").exists(), "its sockets")
     remote.close()
-    assert list(tmp_path.iterdir()) == []
+    assert [file.name for file in lock.directory.iterdir()] == ["lock"]
 
 
-def test_one_that_cannot_be_told_of_a_scene_ends_and_another_serves_that_scene(loop: Any, tmp_path: Path) -> None:
+def test_one_that_cannot_be_told_of_a_scene_ends_and_another_serves_that_scene(loop: Any, lock: InstanceLock) -> None:
     """The daemon ended: where no file can be opened there is none to hand the settings over in."""
     edited = parse(CONFIG.replace('"tool"', '"other"'), "lab.toml")
-    remote = RemoteProcess(tmp_path)
+    remote = RemoteProcess(lock)
     remote.serve(parse(CONFIG, "lab.toml"), loop, None, 0)
-    wait_until(lambda: not list(remote.turn()) and (tmp_path / "scene").exists(), "its sockets")
+    wait_until(lambda: not list(remote.turn()) and (lock.directory / "scene").exists(), "its sockets")
     with no_descriptor_left():
         remote.serve(edited, loop, None, 0)
     told: list[str] = []
