@@ -164,10 +164,14 @@ class Daemon:
 
     def _end(self, loop: LoopProcess) -> None:
         """See that no force is left, whatever the daemon ends for."""
+        self._end_force(loop)
+        loop.close()
+
+    def _end_force(self, loop: LoopProcess) -> None:
         why = loop.end()
         if why and not loop.force_seen_to:
+            loop.force_seen_to = True
             log.error("%s; %s", why, self._take_force_away())
-        loop.close()
 
     def _rescue(self, why: str) -> None:
         """Take the force away from outside, and be ready to do so again: the daemon may go on."""
@@ -218,6 +222,7 @@ class Daemon:
         while self.exit_code is None:
             self._turn()
             await asyncio.sleep(pause_s(state.publisher.flush_due_ns, time.monotonic_ns()))
+        self._end_force(state.loop)  # one that lost its device may hang, and no record is to be waited for before
         state.recovery.stop()
         state.requests.abandon("the daemon has stopped", self._force_left())
         state.event_log.close(state.config, state.loop, RECORD_TIMEOUT_S)

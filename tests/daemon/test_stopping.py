@@ -107,6 +107,27 @@ def test_a_loop_that_has_to_be_killed_at_the_end_leaves_no_force_behind(
     assert "was killed; the device is without force" in caplog.text
 
 
+def test_no_fault_record_is_waited_for_before_the_force_is_taken_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A stop while the loop hangs in the driver of a lost device: the force stood for as long as a slow disk took."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
+    daemon = supervising.Daemon(parse('[loop]\nrealtime = "off"\n', "lab.toml"), "default")
+    loop = daemon.state.loop
+    loop.process.send_signal(signal.SIGSTOP)
+    daemon.state.recovery.begin(loop, "unplugged")
+    daemon.stop("SIGTERM")
+    seen: list[tuple[int | None, bool]] = []
+
+    def close(*_arguments: object) -> None:
+        seen.append((loop.exit_code, "was killed; the device is without force" in caplog.text))
+
+    monkeypatch.setattr(daemon.state.event_log, "close", close)
+    assert daemon.run() == 0
+    assert seen == [(-signal.SIGKILL, True)]
+    assert caplog.text.count("the device is without force") == 1
+
+
 @pytest.mark.parametrize(
     ("programs", "said"),
     [
