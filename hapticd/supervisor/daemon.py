@@ -97,7 +97,7 @@ class Daemon:
                 on_the_way.pop_all()
             start.go()
             loop = start.wait()
-            self.release.device = identity(loop.info)  # no other takes its place for as long as the daemon runs
+            self.release.name(identity(loop.info))  # no other takes its place for as long as the daemon runs
             starting = undo.enter_context(contextlib.ExitStack())
             starting.callback(self._end, loop)
             publisher = Publisher(config.config.telemetry, self.lock.directory / TELEMETRY, loop.info, offset_ns, ring)

@@ -2,15 +2,18 @@
 
 A process of its own, so that a driver that hangs cannot hang the supervisor. It is ready from the start with
 everything imported, since the device holds its last force until it is released, and the start of an interpreter would
-be most of that time. A byte on its standard output says that it is ready; it then reads its standard input: a mark and
-the identity of the device mean release, nothing that it is not needed. Where the loop is a real-time process so is
-this, so that a computer with more work than processors does not make it late.
+be most of that time. A byte on its standard output says that it is ready; it then reads its standard input to the end:
+lines that name the device, and a mark which means release. Without the mark the supervisor has died, for who does not
+need it any more kills it. The loop lets go at that death by itself; where it is stopped or hangs, it is killed and the
+device released. Where the loop is a real-time process so is this, so that a computer with more work than processors
+does not make it late.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import select
 import signal
@@ -25,6 +28,7 @@ from hapticd.driver import Driver
 from hapticd.errors import DeviceNotFoundError
 from hapticd.loop.realtime import become_realtime
 from hapticd.loop.resume import identity
+from hapticd.supervisor.orphans import kill_orphans
 
 READY_TIMEOUT_S = 10.0
 """How long the helper may take to import what it needs [s]."""
@@ -42,8 +46,8 @@ _NOT_OPENED = "the device could not be opened: "
 _NOT_LET_GO = "the device did not let go: "
 _RELEASED = "the device is without force"
 
-_RELEASE = "!"
-"""What the helper reads before the identity, which may be empty."""
+_RELEASE = b"!"
+"""What the helper reads last where it is to release the device."""
 
 
 class ForceRelease:
@@ -53,15 +57,13 @@ class ForceRelease:
         config: names the device; what of it a reload may change is of no matter here.
 
     Attributes:
-        device: `identity` of the device that has the force: with two of a kind, and no serial number configured,
-            another may be the first to be found. "": any.
         force_left: why the last release may have left a force, a line for people; "" when it did not.
     """
 
     def __init__(self, config: LoadedConfig) -> None:
-        self.device = ""
         self.force_left = ""
         self._config = config
+        self._device = ""
         self._helper, self._ready = _start(config), False
         self._ready_by_s = time.monotonic() + READY_TIMEOUT_S
 
@@ -84,6 +86,22 @@ class ForceRelease:
             waiting.register(output, select.POLLIN)
             self._ready = bool(waiting.poll(timeout_s * 1e3)) and bool(output.read(1))
         return self._ready
+
+    def name(self, device: str) -> None:
+        """Have no other device let go of: with two of a kind, and no serial number configured, one may be found first.
+
+        Args:
+            device: `identity` of the one that has the force.
+        """
+        self._device = device
+        self._tell()
+
+    def _tell(self) -> None:
+        """At once, for the helper may outlive this process."""
+        said = self._helper.stdin
+        assert said is not None
+        with contextlib.suppress(OSError):  # it has ended, which `release` sees
+            said.write(json.dumps(self._device).encode() + b"\n")
 
     def release(self) -> str:
         """Open the device in the helper and disable it; where that cannot be, in this process. Never raises.
@@ -116,7 +134,7 @@ class ForceRelease:
 
     def _by_helper(self) -> str:
         try:
-            _, said = self._helper.communicate(_encoded(self.device), TIMEOUT_S)
+            _, said = self._helper.communicate(_RELEASE, TIMEOUT_S)
         except subprocess.TimeoutExpired:
             return _NO_ANSWER
         return said.decode(errors="replace").strip() if self._helper.returncode else _RELEASED
@@ -127,7 +145,7 @@ class ForceRelease:
 
         def let_go() -> None:
             try:
-                said[0] = _let_go(self._config.make_driver(), self.device) or _RELEASED
+                said[0] = _let_go(self._config.make_driver(), self._device) or _RELEASED
             except Exception as error:  # noqa: BLE001 - a driver is anybody's code
                 said[0] = f"{_NOT_OPENED}{error}"
 
@@ -147,6 +165,7 @@ class ForceRelease:
         """
         self.close()
         self._helper, self._ready = _start(self._config), False
+        self._tell()
         self._ready_by_s = time.monotonic() + READY_TIMEOUT_S
 
     def close(self) -> None:
@@ -161,7 +180,10 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
         file.write(config.text.encode())
         file.seek(0)
         return subprocess.Popen(
-            [sys.executable, "-P", "-m", "hapticd.supervisor.force_release", "--config", str(file.fileno())],
+            [
+                *(sys.executable, "-P", "-m", "hapticd.supervisor.force_release"),
+                *("--config", str(file.fileno()), "--parent", str(os.getpid())),
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -169,10 +191,6 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
             bufsize=0,
             start_new_session=True,
         )
-
-
-def _encoded(device: str) -> bytes:
-    return f"{_RELEASE}{device}".encode(errors="surrogateescape")
 
 
 def _let_go(driver: Driver[Any], device: str) -> str:
@@ -195,18 +213,22 @@ def main() -> int:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     parser = argparse.ArgumentParser()
     parser.add_argument("--config", type=int, required=True)
+    parser.add_argument("--parent", type=int, required=True)
     arguments = parser.parse_args()
     try:
         with os.fdopen(arguments.config, "rb") as file:
             config = parse(file.read().decode(), "configuration")
         loop = config.config.loop
         driver = config.make_driver()
+        cpus = os.sched_getaffinity(0)
         become_realtime(loop.model_copy(update={"realtime": "off" if loop.realtime == "off" else "preferred"}))
+        os.sched_setaffinity(0, cpus)  # behind a real-time loop that never waits it would not run
         os.write(sys.stdout.fileno(), b"r")
-        asked = sys.stdin.buffer.read().decode(errors="surrogateescape")
-        if not asked:
+        *named, mark = sys.stdin.buffer.read().split(b"
+")
+        if mark != _RELEASE and not kill_orphans(arguments.parent):
             return 0
-        problem = _let_go(driver, asked.removeprefix(_RELEASE))
+        problem = _let_go(driver, json.loads(named[-1]) if named else "")
     except Exception as error:  # noqa: BLE001 - a driver is anybody's code; its exception becomes one line
         problem = f"{_NOT_OPENED}{error}"
     with contextlib.suppress(OSError):

@@ -202,11 +202,11 @@ def test_another_device_of_the_same_kind_is_not_taken_for_the_one_with_the_force
     else:
         release.close()
         monkeypatch.setattr("sys.executable", "/gone/python")
-    release.device = "omega.7 17 (x, y, z)"
+    release.name("omega.7 17 (x, y, z)")
     assert release.release().endswith(f"the device could not be opened: found {found} instead of omega.7 17 (x, y, z)")
     assert "found" in release.force_left
     if helper:
         release.renew()
-    release.device = found
+    release.name(found)
     assert release.release().endswith("the device is without force")
     assert release.force_left == ""

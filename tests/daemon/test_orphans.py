@@ -1,0 +1,87 @@
+"""A supervisor that is killed while its loop cannot let go: the helper outlives both, and takes the force away."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hapticd.loop.memory import RECORDS, SharedMemory
+from hapticd.supervisor.orphans import kill_orphans
+from tests.daemon.running import Daemon, gone, wait_until
+from tests.faults.rig import Rig
+
+HELPER = b"hapticd.supervisor.force_release"
+
+
+def stands_still(memory: SharedMemory) -> bool:
+    before = memory.words[RECORDS]
+    time.sleep(0.1)
+    return memory.words[RECORDS] == before
+
+
+def helper_pid(daemon: Daemon) -> int:
+    pid = daemon.process.pid
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return next(int(child) for child in children if HELPER in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0"))
+
+
+@pytest.mark.parametrize("stopped", [True, False], ids=["stopped", "hanging"])
+def test_the_force_of_a_loop_that_does_not_notice_is_taken_away(stopped: bool) -> None:
+    """The helper took the end of its supervisor for "not needed", and the device kept the force."""
+    with Rig() as rig:
+        rig.pressed()
+        control, helper = rig.daemon.control_pid(), helper_pid(rig.daemon)
+        rig.daemon.process.send_signal(signal.SIGSTOP)  # or it would see to the loop itself
+        if stopped:
+            os.kill(control, signal.SIGSTOP)
+        else:
+            memory = rig.daemon.memory()
+            rig.order("hang-write")
+            wait_until(lambda: stands_still(memory), "the loop to hang")
+            memory.close()
+        assert rig.felt().force_n != 0.0
+        rig.daemon.process.kill()
+        rig.daemon.process.wait()
+        wait_until(lambda: gone(helper), "the end of the helper")
+        assert gone(control)
+        assert rig.felt().force_n == 0.0
+
+
+def test_a_device_that_the_loop_has_let_go_of_is_left_alone() -> None:
+    """Another daemon may have it by then."""
+    with Rig() as rig:
+        rig.pressed()
+        rig.order("")
+        control, helper = rig.daemon.control_pid(), helper_pid(rig.daemon)
+        rig.daemon.process.kill()
+        rig.daemon.process.wait()
+        wait_until(lambda: gone(control), "the end of the loop")
+        assert rig.released().force_n == 0.0
+        wait_until(lambda: gone(helper), "the end of the helper")
+        assert rig.felt().opened == 0
+
+
+def test_the_helper_is_bound_to_no_processor() -> None:
+    """On that of a real-time loop that never waits it would not run."""
+    with Daemon("").wait_ready() as daemon:
+        assert os.sched_getaffinity(helper_pid(daemon)) == os.sched_getaffinity(0)
+
+
+def test_no_process_but_a_loop_of_that_supervisor_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hapticd.supervisor.orphans.END_TIMEOUT_S", 0.0)
+    waits = [sys.executable, "-c", "input()", "hapticd.loop.process", "--parent"]
+    with (
+        subprocess.Popen([*waits, "99999991"], stdin=subprocess.PIPE) as theirs,
+        subprocess.Popen([*waits, "99999992"], stdin=subprocess.PIPE) as other,
+    ):
+        assert kill_orphans(99999991)
+        assert theirs.wait() == -signal.SIGKILL
+        assert not kill_orphans(99999991)
+        assert other.poll() is None
+        other.kill()
