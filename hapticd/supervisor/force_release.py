@@ -224,10 +224,11 @@ def main() -> int:
         become_realtime(loop.model_copy(update={"realtime": "off" if loop.realtime == "off" else "preferred"}))
         os.sched_setaffinity(0, cpus)  # behind a real-time loop that never waits it would not run
         os.write(sys.stdout.fileno(), b"r")
-        *named, mark = sys.stdin.buffer.read().split(b"
-")
-        if mark != _RELEASE and not kill_orphans(arguments.parent):
-            return 0
+        *named, mark = sys.stdin.buffer.read().split(b"\n")
+        if mark != _RELEASE:
+            if not kill_orphans(arguments.parent):
+                return 0
+            signal.setitimer(signal.ITIMER_REAL, TIMEOUT_S)  # ends this; no one is left who would, if the driver hangs
         problem = _let_go(driver, json.loads(named[-1]) if named else "")
     except Exception as error:  # noqa: BLE001 - a driver is anybody's code; its exception becomes one line
         problem = f"{_NOT_OPENED}{error}"

@@ -67,6 +67,38 @@ def test_a_device_that_the_loop_has_let_go_of_is_left_alone() -> None:
         assert rig.felt().opened == 0
 
 
+HANGING = """
+import sys
+import time
+from pathlib import Path
+from hapticd_drivers.loopback import Loopback
+class Hanging(Loopback):
+    def _open(self):
+        if Path(sys.argv[0]).stem == "force_release":
+            time.sleep(3600.0)
+        return super()._open()
+"""
+
+
+def test_a_helper_that_hangs_in_the_driver_does_not_stay(tmp_path: Path) -> None:
+    """It would have the device, and no one would end it."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/__init__.py").touch()
+    (tmp_path / "lab/hanging.py").write_text(HANGING)
+    with Daemon('[device]\ndriver = "lab.hanging"\n', pythonpath=tmp_path).wait_ready() as daemon:
+        control, helper = daemon.control_pid(), helper_pid(daemon)
+        daemon.process.send_signal(signal.SIGSTOP)
+        os.kill(control, signal.SIGSTOP)
+        daemon.process.kill()
+        daemon.process.wait()
+        wait_until(lambda: gone(control), "the end of the loop")
+        try:
+            wait_until(lambda: gone(helper), "the end of the helper")
+        finally:
+            if not gone(helper):
+                os.kill(helper, signal.SIGKILL)
+
+
 def test_the_helper_is_bound_to_no_processor() -> None:
     """On that of a real-time loop that never waits it would not run."""
     with Daemon("").wait_ready() as daemon:
