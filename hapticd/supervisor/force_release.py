@@ -100,7 +100,7 @@ class ForceRelease:
         """At once, for the helper may outlive this process."""
         said = self._helper.stdin
         assert said is not None
-        with contextlib.suppress(OSError):  # it has ended, which `release` sees
+        with contextlib.suppress(OSError, ValueError):  # it has ended or is closed, which `release` sees
             said.write(json.dumps(self._device).encode() + b"\n")
 
     def release(self) -> str:
