@@ -146,6 +146,18 @@ class SlotWriter:
         """Whether the loop has the same list of ports."""
         return self._shared.words[PORTS] == self.ports_list
 
+    def written(self, index: int) -> Update | None:
+        """What was said of a port last, whoever wrote it; None: nothing, or with another list of ports.
+
+        Args:
+            index: which one.
+        """
+        if self._words[index * _WORDS + 1] != self.ports_list:
+            return None
+        update = Update()
+        unpack(self._area, index * SLOT_BYTES + _UPDATE, update)
+        return update
+
     def write(self, index: int, update: Update) -> None:
         """Say something of a port.
 

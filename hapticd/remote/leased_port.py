@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Any
 from hapticd.config.ports import PortLimits
 from hapticd.remote.delays import DelayHistogram
 from hapticd.remote.message import LARGEST_NUMBER, examine, merge
-from hapticd.tick.remote.update import MOTION, RELEASED, Update
+from hapticd.tick.remote.update import RELEASED, Update
 
 _LONGEST_DELAY_NS = 10_000_000_000  # a client that says that it sent a message earlier has another clock
 _REMEMBERED = 64
@@ -45,11 +46,12 @@ class LeasedPort:
     Args:
         limits: what it is.
         lease_s: how long a client that says nothing keeps it [s].
+        update: what whoever heard clients before has heard of it last; None: nothing.
 
     Attributes:
         limits: what it is.
         lease_s: how long a client that says nothing keeps it [s].
-        update: all that its owner has said.
+        update: all that its owner has said, or the last one where it has none.
         owner: the client that it belongs to; None: to none.
         messages: taken.
         late: messages that were passed over: behind a newer one, older than `hold_s`, or of a client that had gone.
@@ -58,10 +60,10 @@ class LeasedPort:
         round_trips: from the tick whose state a message answers to the tick that it was first in force at.
     """
 
-    def __init__(self, limits: PortLimits, lease_s: float) -> None:
+    def __init__(self, limits: PortLimits, lease_s: float, update: Update | None = None) -> None:
         self.limits = limits
         self.lease_s = lease_s
-        self.update = Update()
+        self.update = Update() if update is None else update
         self.owner: Sender | None = None
         self.messages = 0
         self.late = 0
@@ -70,8 +72,6 @@ class LeasedPort:
         self.round_trips = DelayHistogram()
         self._under_way: deque[tuple[int, int, int]] = deque(maxlen=_REMEMBERED)
         self._in_force = -1
-        self._moved_seq = -1
-        self._moved_ns = 0
 
     def owner_at(self, now_ns: int) -> Sender | None:
         """Whom the port belongs to now."""
@@ -101,18 +101,13 @@ class LeasedPort:
             return self._release(now_ns)
         said = examine(fields, self.limits, axes)
         if owner is None:
-            self.update = Update()
-            self._under_way.clear()
-            self._moved_seq = -1
+            self._begin(sender, said.seq)
         self.owner = sender  # who has another connection by now, perhaps
         self.update.received_ns = now_ns  # a message that is late shows that its sender lives
         if said.seq <= self.update.seq:
             self.late += 1
             return False
-        if said.bits & MOTION and said.moved_seq > self._moved_seq:  # else it repeats what was said of motion before
-            self._moved_seq = said.moved_seq
-            self._moved_ns = now_ns
-        merge(said, self.update, self._moved_ns)
+        merge(said, self.update, now_ns)
         known = sender.local and said.sent_ns and 0 <= now_ns - said.sent_ns <= _LONGEST_DELAY_NS
         self.update.sent_ns = said.sent_ns if known else 0
         if known and now_ns - said.sent_ns > self.limits.hold_s * 1e9:  # the loop does not go by it, but later ones may
@@ -141,6 +136,18 @@ class LeasedPort:
                 if 0 <= state_seq <= tick:
                     self.round_trips.add((tick - state_seq) * period_ns)
 
+    def _begin(self, sender: Sender, seq: int) -> None:
+        """Have another owner, with nothing said, or the last one once more, which goes on.
+
+        It does where its lease had ended, or where another process has heard it before.
+        """
+        client = _number_of(sender)
+        if client == self.update.client and seq > self.update.seq and not self.update.said & RELEASED:
+            return
+        self.update = Update()
+        self.update.client = client
+        self._under_way.clear()
+
     def _release(self, now_ns: int) -> bool:
         """Have the loop let go, of what a client whose lease has ended holds as well; whether it is yet to be told."""
         if self.update.said & RELEASED:
@@ -151,3 +158,8 @@ class LeasedPort:
         self.update.received_ns = now_ns
         self.update.sent_ns = 0
         return True
+
+
+def _number_of(sender: Sender) -> int:
+    """A number for a client, never 0, which is the same for whoever hears it."""
+    return int.from_bytes(hashlib.blake2b(sender.identity, digest_size=8).digest(), "little") >> 1 | 1

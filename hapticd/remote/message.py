@@ -16,6 +16,7 @@ from hapticd.config.ports import PortLimits
 from hapticd.tick.remote.update import (
     DAMPING,
     FORCE,
+    MOTION,
     ORIENTATION,
     POSITION,
     RELEASED,
@@ -111,16 +112,22 @@ def examine(fields: Mapping[str, Any], port: PortLimits, axes: int) -> Said:
     return Said(seq, sent_ns, state_seq, moved_seq, values, bits)
 
 
-def merge(said: Said, update: Update, moved_ns: int) -> None:
+def merge(said: Said, update: Update, now_ns: int) -> None:
     """Put what a message says into all that was said before.
 
     A velocity belongs to the position that it came with: a message with another position and no velocity ends it.
+    Motion that was said before keeps the time at which it was.
 
     Args:
         said: the message.
         update: all that was said before.
-        moved_ns: when what first said its motion was taken [ns].
+        now_ns: when the message was taken [ns].
     """
+    new = said.bits
+    if said.moved_seq <= update.moved_seq:  # it repeats what was said of motion before
+        new &= ~update.said
+    elif said.bits & MOTION:
+        update.moved_seq = said.moved_seq
     over = RELEASED
     if said.bits & POSITION:
         over |= VELOCITY
@@ -128,7 +135,7 @@ def merge(said: Said, update: Update, moved_ns: int) -> None:
         over |= TURNING
     update.said = update.said & ~over | said.bits
     update.seq = said.seq
-    update.stamp(said.bits, moved_ns)
+    update.stamp(new, now_ns)
     for key, value in said.values.items():
         if isinstance(value, list):
             getattr(update, key)[: len(value)] = value

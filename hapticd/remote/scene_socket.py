@@ -81,6 +81,8 @@ class SceneSocket:
     ) -> None:
         """Go on with these ports; one that was there keeps its owner and what was said.
 
+        The first time what another process has heard before is known: a client that comes back goes on with that.
+
         Args:
             limits: the ports, in the order of the scene.
             writer: where to hand on what is said.
@@ -90,10 +92,10 @@ class SceneSocket:
         """
         before = self.ports
         self.ports = {}
-        for each in limits:
+        for index, each in enumerate(limits):
             port = before.get(each.name)
             if port is None or port.limits.kind != each.kind:
-                port = LeasedPort(each, lease_s)
+                port = LeasedPort(each, lease_s, writer.written(index) if self._writer is None else None)
             port.limits = each
             port.lease_s = lease_s
             self.ports[each.name] = port

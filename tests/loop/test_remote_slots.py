@@ -153,6 +153,19 @@ def test_what_a_killed_writer_has_left_half_done_is_taken_for_no_port(
         assert [update.position_m[0] for update in port.heard] == [0.3]
 
 
+def test_who_writes_next_knows_what_was_said_last_of_the_same_ports(shared: SharedMemory) -> None:
+    before = SlotWriter(shared, PORTS)
+    before.write(0, at(0.1))
+    before.write(0, at(0.2, seq=2))
+    said = SlotWriter(shared, PORTS).written(0)
+    assert said is not None
+    assert (said.seq, said.position_m[0]) == (2, 0.2)
+    assert SlotWriter(shared, PORTS).written(1) is None, "nothing was"
+    assert SlotWriter(shared, reversed(PORTS)).written(0) is None, "it was said of another"
+    shared.remote_words[0] -= 1
+    assert SlotWriter(shared, PORTS).written(0) is None, "it was left half done"
+
+
 class Watched(Update):
     """An update that notes how the word that guards its slot stands while it is written."""
 

@@ -367,3 +367,27 @@ def test_a_killed_process_is_started_again_and_a_client_goes_on_by_itself(daemon
     states = [port.state for record in records for port in ports_of(record)]
     assert states[-1] == PortState.HELD
     assert max(abs(record.force_n[0]) for record in records) <= MAX_FORCE_N + 1e-9
+
+
+def test_a_process_that_is_started_anew_throws_a_moving_target_not_back() -> None:
+    """A softer spring, said after it has come back: the target went back to where it was said to be seconds before."""
+    speed_m_per_s = 0.01
+    config = UNDAMPED.replace(f"hold_s = {HOLD_S}", "hold_s = 10.0")
+    with Daemon(config).wait_ready() as daemon, driven(daemon) as tool:
+        hold_at_last(tool, 0.0)
+        tool.move([0.0], [speed_m_per_s])
+        sent = tool.seq
+        wait_until(lambda: tool.state(20.0).ports["tool"].seq == sent, "it to be in force")
+        before = remote_pid(daemon)
+        os.kill(before, signal.SIGKILL)
+        wait_until(lambda: remote_pid(daemon) not in (0, before), "another process")
+        wait_until(lambda: tool.state(20.0).ports["tool"].target_m[0] > 2e-3, "the target to have gone on")
+        tool.change(stiffness_n_per_m=100.0)
+        ways_m = []
+        for _ in range(1000):
+            port = tool.state(20.0).ports["tool"]
+            ways_m.append(port.target_m[0])
+            if port.seq == tool.seq and len(ways_m) > 200:
+                break
+    assert port.seq == tool.seq
+    assert min(later - one for one, later in pairwise(ways_m)) > -1e-5

@@ -9,7 +9,7 @@ import pytest
 
 from hapticd.remote.leased_port import LeasedPort, NotTakenError, Sender
 from hapticd.remote.message import LARGEST_NUMBER, WrongMessageError
-from hapticd.tick.remote.update import POSITION, RELEASED, STIFFNESS
+from hapticd.tick.remote.update import POSITION, RELEASED, STIFFNESS, VELOCITY
 from tests.remote.heard import TOOL, copied
 
 ONE = Sender(b"one", 7, 70, True, "user 1000, process 1")
@@ -105,6 +105,56 @@ def test_motion_has_the_time_at_which_it_was_said_first(port: LeasedPort) -> Non
     assert said() == (5, 5)
     say(port, TWO, 2000, 1, velocity_m_per_s=[0.1])
     assert said() == (2000, 2000)
+
+
+def heard_by_another(port: LeasedPort) -> LeasedPort:
+    """The same port after the process that hears clients was started anew."""
+    return LeasedPort(TOOL, LEASE_S, copied(port.update))
+
+
+def test_a_process_that_is_started_anew_knows_what_its_client_only_repeats(port: LeasedPort) -> None:
+    say(port, ONE, 1, 1, velocity_m_per_s=[0.1], stiffness_n_per_m=100.0)
+    again = heard_by_another(port)
+    assert again.owner_at(2 * MS) is None, "who comes first has the name, as ever"
+    assert say(again, ONE, 500, 2, position_m=[0.001], velocity_m_per_s=[0.1], moved_seq=1)
+    assert (again.update.position_ns, again.update.velocity_ns) == (MS, MS)
+    assert again.update.said == POSITION | VELOCITY | STIFFNESS, "what it leaves out stays as it was said"
+    assert say(again, ONE, 501, 3, velocity_m_per_s=[0.1])
+    assert (again.update.position_ns, again.update.velocity_ns) == (501 * MS, 501 * MS)
+
+
+@pytest.mark.parametrize(
+    ("who", "seq", "releases"),
+    [(TWO, 3, False), (ONE, 2, False), (ONE, 4, True)],
+    ids=["another client", "one that counts from the beginning", "one that had let go"],
+)
+def test_who_is_another_begins_with_nothing_said_after_a_start_anew(
+    port: LeasedPort, who: Sender, seq: int, releases: bool
+) -> None:
+    say(port, ONE, 1, 2, stiffness_n_per_m=100.0)
+    if releases:
+        port.take({"release": True}, ONE, 1, 2 * MS)
+    again = heard_by_another(port)
+    assert say(again, who, 500, seq, moved_seq=1)
+    assert (again.update.said, again.update.position_ns) == (POSITION, 500 * MS)
+
+
+def test_one_whose_lease_has_ended_goes_on_where_no_other_has_come(port: LeasedPort) -> None:
+    """`hold_s` may be longer than the lease: its target, still under way, was thrown back by a softer spring."""
+    say(port, ONE, 1, 1, velocity_m_per_s=[0.1])
+    assert port.owner_at(1500 * MS) is None
+    assert say(port, ONE, 1500, 2, position_m=[0.001], velocity_m_per_s=[0.1], moved_seq=1)
+    assert (port.update.position_ns, port.update.velocity_ns) == (MS, MS)
+    assert say(port, TWO, 3000, 3, moved_seq=1)
+    assert (port.update.said, port.update.position_ns) == (POSITION, 3000 * MS)
+
+
+def test_a_velocity_that_was_said_alone_leaves_the_place_of_before_what_it_was(port: LeasedPort) -> None:
+    """A message that repeats both took the target back to a place that it had left."""
+    say(port, ONE, 1, 1)
+    port.take({"seq": 2, "velocity_m_per_s": [0.2]}, ONE, 1, 2 * MS)
+    say(port, ONE, 3, 3, velocity_m_per_s=[0.2], moved_seq=2)
+    assert (port.update.position_ns, port.update.velocity_ns) == (MS, 2 * MS)
 
 
 def test_letting_go_is_told_and_frees_the_name(port: LeasedPort) -> None:

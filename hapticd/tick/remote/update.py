@@ -22,7 +22,7 @@ MOTION = POSITION | ORIENTATION | VELOCITY | TURNING
 SLOT_BYTES = 256
 """What one port has in shared memory: an update and room for the words that guard it."""
 
-_FIELDS = Struct("<8q18d")
+_FIELDS = Struct("<10q18d")
 
 PACKED_BYTES = _FIELDS.size
 """How much of a slot an update takes."""
@@ -38,6 +38,8 @@ class Update:
         received_ns: when the daemon took it [ns of CLOCK_MONOTONIC].
         position_ns, velocity_ns, orientation_ns, turning_ns: when the daemon took what first said the position, the
             velocity and so on that are in it: another one than before is said anew, the same one is only repeated [ns].
+        client: a number for who has said it, by which whoever hears clients next knows it again; 0: no one.
+        moved_seq: the client's own number of the message that said motion anew last; -1: none has.
         position_m: of the target or the object, one element an axis, 0.0 beyond [m].
         velocity_m_per_s: of the same [m/s].
         angular_velocity_rad_per_s: of the object, in the frame of the world [rad/s].
@@ -48,8 +50,10 @@ class Update:
 
     __slots__ = (
         "angular_velocity_rad_per_s",
+        "client",
         "damping_n_s_per_m",
         "force_n",
+        "moved_seq",
         "orientation",
         "orientation_ns",
         "position_m",
@@ -73,6 +77,8 @@ class Update:
         self.velocity_ns = 0
         self.orientation_ns = 0
         self.turning_ns = 0
+        self.client = 0
+        self.moved_seq = -1
         self.position_m = [0.0, 0.0, 0.0]
         self.velocity_m_per_s = [0.0, 0.0, 0.0]
         self.angular_velocity_rad_per_s = [0.0, 0.0, 0.0]
@@ -117,6 +123,8 @@ def pack(update: Update, view: memoryview | bytearray, at: int) -> None:
         update.velocity_ns,
         update.orientation_ns,
         update.turning_ns,
+        update.client,
+        update.moved_seq,
         *update.position_m,
         *update.velocity_m_per_s,
         *update.angular_velocity_rad_per_s,
@@ -138,9 +146,10 @@ def unpack(view: memoryview | bytearray | bytes, at: int, into: Update) -> None:
     values = _FIELDS.unpack_from(view, at)
     into.said, into.seq, into.sent_ns, into.received_ns = values[:4]
     into.position_ns, into.velocity_ns, into.orientation_ns, into.turning_ns = values[4:8]
-    into.position_m[:] = values[8:11]
-    into.velocity_m_per_s[:] = values[11:14]
-    into.angular_velocity_rad_per_s[:] = values[14:17]
-    into.force_n[:] = values[17:20]
-    into.orientation[:] = values[20:24]
-    into.stiffness_n_per_m, into.damping_n_s_per_m = values[24:]
+    into.client, into.moved_seq = values[8:10]
+    into.position_m[:] = values[10:13]
+    into.velocity_m_per_s[:] = values[13:16]
+    into.angular_velocity_rad_per_s[:] = values[16:19]
+    into.force_n[:] = values[19:22]
+    into.orientation[:] = values[22:26]
+    into.stiffness_n_per_m, into.damping_n_s_per_m = values[26:]

@@ -33,6 +33,7 @@ def updates(draw: st.DrawFn) -> Update:
     update = Update()
     for name in ("said", "seq", "sent_ns", "received_ns", "position_ns", "velocity_ns", "orientation_ns", "turning_ns"):
         setattr(update, name, draw(WORDS))
+    update.client, update.moved_seq = draw(WORDS), draw(WORDS)
     for name in ("position_m", "velocity_m_per_s", "angular_velocity_rad_per_s", "force_n"):
         setattr(update, name, draw(VECTORS))
     update.orientation = draw(st.lists(NUMBERS, min_size=4, max_size=4))
@@ -59,7 +60,7 @@ def test_an_update_comes_back_as_it_was_and_touches_nothing_beside_its_place(upd
 
 def test_an_update_lies_as_numbers_of_eight_bytes_little_end_first() -> None:
     row = struct.pack(
-        "<8q18d", 71, 17, 5_000, 6_000, 6_001, 6_002, 6_003, 6_004, *[float(number) for number in range(18)]
+        "<10q18d", 71, 17, 5_000, 6_000, 6_001, 6_002, 6_003, 6_004, 99, 16, *[float(number) for number in range(18)]
     )
     assert len(row) == PACKED_BYTES <= SLOT_BYTES - 16
     update = Update()
@@ -73,6 +74,8 @@ def test_an_update_lies_as_numbers_of_eight_bytes_little_end_first() -> None:
         "velocity_ns": 6_002,
         "orientation_ns": 6_003,
         "turning_ns": 6_004,
+        "client": 99,
+        "moved_seq": 16,
         "position_m": [0.0, 1.0, 2.0],
         "velocity_m_per_s": [3.0, 4.0, 5.0],
         "angular_velocity_rad_per_s": [6.0, 7.0, 8.0],
@@ -98,6 +101,8 @@ def test_nothing_is_said_in_a_new_update_and_every_number_is_newer() -> None:
         "velocity_ns": 0,
         "orientation_ns": 0,
         "turning_ns": 0,
+        "client": 0,
+        "moved_seq": -1,
         "position_m": [0.0] * 3,
         "velocity_m_per_s": [0.0] * 3,
         "angular_velocity_rad_per_s": [0.0] * 3,
