@@ -47,6 +47,9 @@ A controller that is switched on counts from within half a turn of 0, whatever i
 there to the mark, so that who counts from it was told by hapticd.
 """
 
+NO_HOME = 0.5
+"""This share of the turns of a home is where one that counts no milliseconds counts from while home is looked for."""
+
 AT_ONCE_S = 0.005
 """What a controller has said of its place says where home is for this time, since the handle may move [s]."""
 
@@ -65,6 +68,8 @@ class MoteusMotor(Motor):
         most_n_m: torque that it may apply [N m].
         absolute: it is to know by itself where it is: turn 0 is home.
         mark_turns: where it counts a home that it is told, forwards or backwards from 0 [turns].
+        places: where it counts from as it was told; elsewhere it has restarted. Empty: that is not known [turns].
+        has_counter: it counts milliseconds, so that a restart shows.
         mode, fault, home_state: its registers.
         firmware, serial: what it is; "" until it has said so.
     """
@@ -73,11 +78,13 @@ class MoteusMotor(Motor):
         "absolute",
         "fault",
         "firmware",
+        "has_counter",
         "home_state",
         "mark_turns",
         "milliseconds",
         "mode",
         "most_n_m",
+        "places",
         "restarted",
         "serial",
     )
@@ -93,6 +100,8 @@ class MoteusMotor(Motor):
         self.fault = 0
         self.home_state = 0
         self.milliseconds = 0
+        self.places: tuple[float, ...] = ()
+        self.has_counter = False
         self.restarted = False
         self.firmware = ""
         self.serial = ""
@@ -101,8 +110,16 @@ class MoteusMotor(Motor):
     def home_turns(self) -> float | None:
         """Where it counts the home that it was told by hapticd [turns]; None: it has none, or lost it."""
         mark_turns = math.copysign(self.mark_turns, self.turns)
-        marked = self.home_state == HOME_AT_OUTPUT and abs(self.turns - mark_turns) < 0.25 * self.mark_turns
-        return mark_turns if marked else None
+        return mark_turns if self.counts_from(mark_turns) else None
+
+    @property
+    def needs_mark(self) -> bool:
+        """Whether only a place that it is told can show that its controller restarts."""
+        return not self.has_counter and not self.absolute  # that counts from the same place afterwards
+
+    def counts_from(self, place_turns: float) -> bool:
+        """Whether it was told a place near which it is [turns]."""
+        return self.home_state == HOME_AT_OUTPUT and abs(self.turns - place_turns) < 0.25 * self.mark_turns
 
 
 class MoteusCrew(Crew):
@@ -176,6 +193,9 @@ class MoteusCrew(Crew):
         """Forget who was switched off and on: the driver has looked whether all still know their home."""
         for motor in self._motors:
             motor.restarted = False
+            if not motor.has_counter:
+                home_turns = motor.home_turns
+                motor.places = () if home_turns is None else (home_turns,)
 
     def disable(self) -> None:
         """Let go, until all have said that they have."""
@@ -214,20 +234,15 @@ class MoteusCrew(Crew):
         older one.
         """
         for index, (motor, home) in enumerate(zip(self._motors, turns, strict=True)):
-            if home is None:
-                continue
-            mark_turns = math.copysign(motor.mark_turns, -motor.turns)
-            states, end_s = motor.states, time.monotonic() + GREETING_PATIENCE_S
-            while motor.home_turns != mark_turns:
-                if time.monotonic() > end_s:
-                    if motor.states == states:
-                        raise self._silent([index], GREETING_PATIENCE_S)
-                    raise DeviceProtocolError(f"{self._name}: controller {motor.address} has not taken its home")
-                where = self._says(index, registers.QUERY)  # the handle may have moved since
-                if motor.restarted:
-                    raise self._has_restarted(motor)
-                if where and motor.home_turns != mark_turns:
-                    self._says(index, registers.here_is(motor.turns - home + mark_turns))
+            if home is not None:
+                self._tell(index, home, math.copysign(motor.mark_turns, -motor.turns))
+
+    def mark(self, index: int) -> float:
+        """Have one that counts no milliseconds count from a place that it does not get to by itself, and is no home."""
+        motor = self._motors[index]
+        mark_turns = math.copysign(NO_HOME * motor.mark_turns, -motor.turns)
+        self._tell(index, motor.turns, mark_turns)
+        return mark_turns
 
     def prove_watchdog(self) -> None:
         """Command nothing while a torque of 0 holds; questions feed no watchdog."""
@@ -242,6 +257,24 @@ class MoteusCrew(Crew):
             self.ask()
             self.await_states(_LOOK_S)
             self.note()
+
+    def _tell(self, index: int, turns: float, place_turns: float) -> None:
+        """Have one count what is at some turns now at a place where it counts nothing yet."""
+        motor = self._motors[index]
+        if motor.places:
+            motor.places = (*motor.places, place_turns)
+        states, end_s = motor.states, time.monotonic() + GREETING_PATIENCE_S
+        while not motor.counts_from(place_turns):
+            if time.monotonic() > end_s:
+                if motor.states == states:
+                    raise self._silent([index], GREETING_PATIENCE_S)
+                raise DeviceProtocolError(f"{self._name}: controller {motor.address} has not taken its home")
+            where = self._says(index, registers.QUERY)  # the handle may have moved since
+            if motor.restarted:
+                raise self._has_restarted(motor)
+            if where and not motor.counts_from(place_turns):
+                self._says(index, registers.here_is(motor.turns - turns + place_turns))
+        motor.places = (place_turns,)
 
     def _says(self, index: int, data: bytes) -> bool:
         """Whether one answers at once; its state is new then."""
@@ -306,10 +339,14 @@ class MoteusCrew(Crew):
                 motor.temperature_c = found[TEMPERATURE]
                 motor.fault = int(found[FAULT])
                 motor.home_state = int(found[HOME_STATE])
-                milliseconds = int(found.get(MILLISECONDS, motor.milliseconds))  # older firmware has none
-                if milliseconds - motor.milliseconds & _BACKWARDS:
+                motor.has_counter = MILLISECONDS in found  # older firmware has none
+                if motor.has_counter:
+                    milliseconds = int(found[MILLISECONDS])
+                    if milliseconds - motor.milliseconds & _BACKWARDS:
+                        motor.restarted = True
+                    motor.milliseconds = milliseconds
+                elif motor.places and not any(map(motor.counts_from, motor.places)):
                     motor.restarted = True
-                motor.milliseconds = milliseconds
                 motor.states += 1
                 motor.heard = True
             if SERIAL in found:

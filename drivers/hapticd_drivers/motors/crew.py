@@ -64,6 +64,11 @@ class Motor:
         """Where its controller counts the home that it was told by hapticd [turns]; None: it has none, or lost it."""
         return None
 
+    @property
+    def needs_mark(self) -> bool:
+        """Whether only a place that it is told can show that its controller restarts: `Crew.mark`."""
+        return False
+
 
 class Crew(ABC):
     """The motors on a bus.
@@ -148,6 +153,20 @@ class Crew(ABC):
         Raises:
             DriverError: one has not taken it, or has been switched off and on.
         """
+
+    def mark(self, index: int) -> float:
+        """Have a controller that needs it count from a place that a restart loses; its home of before is lost.
+
+        Args:
+            index: of the motor.
+
+        Returns:
+            Where it counts the place at which it was last seen now [turns].
+
+        Raises:
+            DriverError: it has not taken it, or has been switched off and on.
+        """
+        raise NotImplementedError
 
     @abstractmethod
     def prove_watchdog(self) -> None:

@@ -238,6 +238,7 @@ class MotorDriver(Driver[MotorOptionsT]):
                     _forget_home(drum)
             try:
                 crew.disable()
+                self._mark(crew)
                 crew.prove_watchdog()
                 crew.enable()
                 for index in range(len(self._drums)):
@@ -257,6 +258,14 @@ class MotorDriver(Driver[MotorOptionsT]):
             self._sign.checked = True
             self._accept()
             crew.ask()
+
+    def _mark(self, crew: Crew) -> None:
+        """Have a restart be seen from here on, also of a controller that does not tell."""
+        for index, (drum, motor) in enumerate(zip(self._drums, crew.motors, strict=True)):
+            if motor.needs_mark:
+                at_m = drum.position_m(motor.turns)
+                _forget_home(drum)
+                drum.put(crew.mark(index), at_m)
 
     def _calibrate_axis(self, mover: MotorMover, index: int) -> None:
         drum = self._drums[index]

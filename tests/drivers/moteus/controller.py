@@ -24,6 +24,7 @@ class MoteusController(Controller):
         mode, fault: as its registers.
         home_state: 0 to 2, by which another encoder has told it where it is.
         wakes_at_home: whether such an encoder does so when it is switched on.
+        has_counter: its firmware counts milliseconds.
         preparing: frames for which it prepares before it follows a torque.
         voltage_v: of its supply; below 10 V it gives up.
         commands: every register that the last command has set.
@@ -36,6 +37,7 @@ class MoteusController(Controller):
         self.home_state = 2
         self.wakes_at_home = False
         self.milliseconds = 1000.0
+        self.has_counter = True
         self.preparing = 0
         self.voltage_v = 24.0
         self.commands: dict[int, Any] = {}
@@ -110,6 +112,9 @@ class MoteusController(Controller):
         buffer = io.BytesIO()
         writer = Writer(buffer)
         for first, resolutions in _runs(query):
+            if first == Register.MILLISECOND_COUNTER and not self.has_counter:
+                buffer.write(bytes((0x31, first, 1)))  # cannot be read
+                continue
             combiner = mp.WriteCombiner(writer, 0x20, first, resolutions)
             for at, resolution in enumerate(resolutions):
                 assert combiner.maybe_write()

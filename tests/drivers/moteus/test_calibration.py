@@ -336,24 +336,99 @@ def test_a_controller_that_restarts_just_before_it_is_armed_is_refused(bench: La
     driver.close()
 
 
-def test_a_calibration_in_which_a_controller_restarts_does_not_pass(
-    bench: Lab, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    driver = opened(bench)
-    find_stop = motion.find_stop
+COUNTER = pytest.mark.parametrize("has_counter", [True, False], ids=["counts milliseconds", "older firmware"])
 
-    def find(drive: motion.Drive, towards: float) -> int:
-        at = find_stop(drive, towards)
+
+@COUNTER
+@pytest.mark.parametrize("homing", ["low_stop", "here"])
+def test_a_calibration_in_which_a_controller_restarts_does_not_pass(
+    bench: Lab, monkeypatch: pytest.MonkeyPatch, has_counter: bool, homing: str
+) -> None:
+    """Older firmware shows it by the place that it counts from: it was taken for home, 50 mm beside it."""
+    bench.first.has_counter = has_counter
+    driver = opened(bench, homing=homing)
+    name = "here" if homing == "here" else "find_stop"
+    find = getattr(motion, name)
+
+    def restart(*asked: Any) -> int:
+        at: int = find(*asked)
         with bench.bench.lock:
             bench.first.restart()
-        drive.push(0.0)
+        asked[0].push(0.0)
         return at
 
-    monkeypatch.setattr(motion, "find_stop", find)
+    monkeypatch.setattr(motion, name, restart)
     with pytest.raises(DeviceFaultError, match="switched off and on"):
         driver.calibrate()
     assert bench.first.torque_n_m == 0.0
+    driver.read()
+    with pytest.raises(DriverStateError, match="not known where the handle is"):
+        driver.enable()
     driver.close()
+
+
+def press_on(driver: Any) -> None:
+    for _ in range(3):
+        driver.write([0.1])
+        driver.read()
+
+
+@COUNTER
+def test_a_controller_that_restarts_under_force_is_let_go(bench: Lab, has_counter: bool) -> None:
+    """It follows the next torque at once, and the handle seemed to be 3 m away."""
+    bench.first.has_counter = has_counter
+    with opened(bench, homing="here") as driver:
+        driver.calibrate()
+        driver.enable()
+        driver.write([0.1])
+        driver.read()
+        bench.first.restart()
+        with pytest.raises(DeviceFaultError, match="switched off and on"):
+            press_on(driver)
+
+
+@pytest.mark.parametrize("calls", [1, 2, 3])
+def test_older_firmware_finds_the_same_home_and_has_none_while_it_is_looked_for(
+    bench: Lab, monkeypatch: pytest.MonkeyPatch, calls: int
+) -> None:
+    """A daemon that is killed in between must not leave what the next one takes for a home."""
+    bench.first.has_counter = False
+    find_stop, homes = motion.find_stop, list[float | None]()
+
+    def find(drive: motion.Drive, towards: float) -> int:
+        homes.append(driver._opened().motors[0].home_turns)
+        if len(homes) < calls:
+            raise DeviceFaultError("given up")
+        return find_stop(drive, towards)
+
+    monkeypatch.setattr(motion, "find_stop", find)
+    with opened(bench) as driver:
+        beside_m = driver.read().position_m[0] - bench.first.shaft.x_m
+        for _ in range(calls - 1):
+            with pytest.raises(DeviceFaultError, match="given up"):
+                driver.calibrate()
+            assert not driver.read().calibrated
+            assert driver.read().position_m[0] - bench.first.shaft.x_m == pytest.approx(beside_m, abs=2e-4)
+        driver.calibrate()
+        assert homes == [None] * calls
+        assert driver.read().calibrated
+        assert driver.read().position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=2e-4)
+        driver.calibrate()
+        driver.enable()
+    with bench.driver(axes=axes(1)) as again:
+        again._state_wait_s = PATIENCE_S
+        assert again.read().calibrated
+        assert again.read().position_m[0] == pytest.approx(bench.first.shaft.x_m, abs=2e-4)
+
+
+def test_older_firmware_that_knows_its_place_by_itself_is_told_none(bench: Lab) -> None:
+    bench.first.has_counter = False
+    bench.first.shaft.x_m = 0.0
+    with bench.driver(axes=axes(1, **SHORT), sign_checked=False, calibration_speed_m_per_s=0.1) as driver:
+        driver._state_wait_s = PATIENCE_S
+        driver.calibrate()
+        assert bench.first._zero == 0.0
+        driver.enable()
 
 
 @pytest.mark.parametrize("sign_checked", [False, True], ids=["it had passed before", "the options say so"])
