@@ -34,6 +34,7 @@ LONGEST_MEAN_S = 0.5
 _LAST_WORDS_MS = 200
 _LARGEST_MESSAGE = 1 << 16
 _SCALARS = ("stiffness_n_per_m", "damping_n_s_per_m")
+_MOTION = ("position_m", "velocity_m_per_s", "orientation", "angular_velocity_rad_per_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,7 +318,9 @@ class RemotePort:
         if self._to_scene.wait(0.0):
             answer = msgpack.unpackb(self._sending.recv())
             if not answer["ok"]:
-                self._said.pop(answer.get("key"), None)  # or all that is said from now on would be refused with it
+                key = answer.get("key")
+                for each in _MOTION if key in _MOTION else (key,):  # a velocity says nothing without its place
+                    self._said.pop(each, None)  # or all that is said from now on would be refused with it
                 raise RefusedError(f"{self.name}: {answer['text']}")
 
     def _take(self) -> RemoteState:

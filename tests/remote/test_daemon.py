@@ -176,6 +176,18 @@ def test_a_softer_spring_throws_a_moving_target_back_no_more(tool: RemotePort) -
     assert min(later - one for one, later in pairwise(ways_m)) > -1e-5
 
 
+def test_a_move_that_was_refused_moves_nothing_later(tool: RemotePort) -> None:
+    """Its velocity went with the next message, without the place: the target went off by 30 mm."""
+    hold_at_last(tool, 0.0)
+    tool.move([math.nan], [0.1])
+    with pytest.raises(RefusedError, match="position_m: must be a finite number"):
+        wait_until(lambda: tool.state(20.0) is None, "the refusal")
+    tool.change(stiffness_n_per_m=100.0)
+    sent = tool.seq
+    wait_until(lambda: tool.state(20.0).ports["tool"].seq == sent, "the change to be in force")
+    assert max(abs(tool.state(20.0).ports["tool"].target_m[0]) for _ in range(100)) < 1e-4
+
+
 def test_a_client_that_is_stopped_keeps_its_name_for_the_lease_and_then_loses_it(daemon: Daemon) -> None:
     with driven(daemon) as other, other_client(daemon) as client:
         wait_until(lambda: other.state().ports["tool"].state == "held", "the other client to be in force")
