@@ -80,8 +80,11 @@ class Coupling(OnePort):
         speed_ns = update.velocity_ns if said & VELOCITY else None
         placed, sped = self._said_motion.hear(update.position_ns, speed_ns)
         if placed or sped:
-            velocity_m_per_s = None if speed_ns is None else update.velocity_m_per_s
-            self.follower.aim(update.position_m if placed else None, velocity_m_per_s, age_s + self._period_s)
+            position_m = update.position_m if placed else None
+            velocity_m_per_s, said_s = None, 0.0
+            if speed_ns is not None:
+                velocity_m_per_s, said_s = update.velocity_m_per_s, update.said_s(speed_ns)
+            self.follower.aim(position_m, velocity_m_per_s, age_s + self._period_s, said_s)
         self._asked.hear(update)
         self._aim()
         return True

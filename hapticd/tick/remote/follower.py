@@ -81,6 +81,7 @@ class Follower:
         position_m: Sequence[float] | None,
         velocity_m_per_s: Sequence[float] | None = None,
         since_s: float = inf,
+        said_s: float = 0.0,
     ) -> None:
         """Go to where a client says that the target is now, and on with its velocity.
 
@@ -89,15 +90,18 @@ class Follower:
             velocity_m_per_s: the same; None: it stands as far as is known [m/s].
             since_s: how long ago that will be after the next move, which may take longer: a late tick, or slow samples
                 [s].
+            said_s: how long it has gone on with that velocity already: the place is an older one [s].
         """
         share = 0.0
         if velocity_m_per_s is not None:
             share = _share(velocity_m_per_s, self._axes, self.max_speed_m_per_s)
+        ahead_s = min(said_s, self.hold_s)
         for axis in self._axes:
             if position_m is not None:
                 self.goal_m[axis] = min(max(position_m[axis], -MOST_M), MOST_M)
             self._goal_m_per_s[axis] = 0.0 if velocity_m_per_s is None else share * velocity_m_per_s[axis]
-        self._ahead_s = 0.0
+            self.goal_m[axis] += self._goal_m_per_s[axis] * ahead_s
+        self._ahead_s = ahead_s
         self._since_s = since_s
         self.rests = False
 

@@ -161,13 +161,19 @@ class RemoteObject(Port):
         speed_ns = update.velocity_ns if said & VELOCITY else None
         placed, sped = self._said_motion.hear(update.position_ns if said & POSITION else None, speed_ns)
         if placed or sped:
-            velocity_m_per_s = None if speed_ns is None else update.velocity_m_per_s
-            self.follower.aim(update.position_m if placed else None, velocity_m_per_s, age_s)
+            position_m = update.position_m if placed else None
+            velocity_m_per_s, said_s = None, 0.0
+            if speed_ns is not None:
+                velocity_m_per_s, said_s = update.velocity_m_per_s, update.said_s(speed_ns)
+            self.follower.aim(position_m, velocity_m_per_s, age_s, said_s)
         speed_ns = update.turning_ns if said & TURNING else None
         placed, sped = self._said_turning.hear(update.orientation_ns if said & ORIENTATION else None, speed_ns)
         if placed or sped:
-            turning_rad_per_s = None if speed_ns is None else update.angular_velocity_rad_per_s
-            self.turning.aim(update.orientation if placed else None, turning_rad_per_s, age_s)
+            orientation = update.orientation if placed else None
+            turning_rad_per_s, said_s = None, 0.0
+            if speed_ns is not None:
+                turning_rad_per_s, said_s = update.angular_velocity_rad_per_s, update.said_s(speed_ns)
+            self.turning.aim(orientation, turning_rad_per_s, age_s, said_s)
         return bool(said & (POSITION | VELOCITY | ORIENTATION | TURNING | STIFFNESS | DAMPING))
 
     def _aim(self, solid: Solid) -> None:

@@ -38,7 +38,11 @@ class Turning:
         self.follower.aim((0.0, 0.0, 0.0))
 
     def aim(
-        self, orientation: Sequence[float] | None, turning_rad_per_s: Sequence[float] | None, since_s: float = inf
+        self,
+        orientation: Sequence[float] | None,
+        turning_rad_per_s: Sequence[float] | None,
+        since_s: float = inf,
+        said_s: float = 0.0,
     ) -> None:
         """Turn to a client's orientation by the shorter way, and on with its angular velocity.
 
@@ -46,12 +50,13 @@ class Turning:
             orientation: of any length; None, or of none: what it has come to by what was said.
             turning_rad_per_s: in the frame around; None: it stands as far as is known [rad/s].
             since_s: how long ago that will be after the next move [s].
+            said_s: how long it has turned on with that already [s].
         """
         goal = (None if orientation is None else unit(orientation)) or _turned(self.follower.goal_m, self._from)
         self._from = self.now
         speed = list(self.follower.speed_m_per_s)
         self.follower.begin((0.0, 0.0, 0.0), speed)
-        self.follower.aim(_way(self.now, goal), turning_rad_per_s, since_s)
+        self.follower.aim(_way(self.now, goal), turning_rad_per_s, since_s, said_s)
 
     def move(self, dt_s: float) -> None:
         """Go on by a tick [s]."""

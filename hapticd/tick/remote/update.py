@@ -103,6 +103,14 @@ class Update:
         if said & TURNING:
             self.turning_ns = said_ns
 
+    def said_s(self, said_ns: int) -> float:
+        """How long before this message a motion in it was said first [s].
+
+        Args:
+            said_ns: when the daemon took that [ns].
+        """
+        return max(0.0, (self.received_ns - said_ns) * 1e-9)
+
 
 def pack(update: Update, view: memoryview | bytearray, at: int) -> None:
     """Write an update.

@@ -151,3 +151,37 @@ def test_what_a_port_has_forgotten_is_taken_from_the_next_message_that_repeats_i
     client.say(position_m=[0.01], moved_seq=moved, stiffness_n_per_m=500.0)
     rig.go([0.0], 100)
     assert client.port.target_m[0] == pytest.approx(0.01, rel=1e-6)
+
+
+@pytest.mark.parametrize(("after_ticks", "gone_s"), [(50, 0.05), (95, 0.095), (300, 0.1)])
+@pytest.mark.parametrize("name", ["tool", "ball"])
+def test_a_place_that_is_said_again_is_where_its_velocity_has_taken_it(
+    name: str, after_ticks: int, gone_s: float
+) -> None:
+    """As after the device was lost: the target began again where it was said to be long before."""
+    rig = Rig((COUPLING if name == "tool" else "") + (BALL if name == "ball" else ""), axes="xyz")
+    client = Client(rig, name)
+    motion = {"position_m": along(0.0), "velocity_m_per_s": [SPEED_M_PER_S, 0.0, 0.0]}
+    moved = client.say(**motion)
+    rig.go([0.5, 0.5, 0.5], after_ticks)
+    rig.tick.start(rig.sample)
+    client.tick += after_ticks * 1_000_000
+    client.say(**motion, moved_seq=moved)
+    rig.go([0.5, 0.5, 0.5])
+    assert client.port.follower.goal_m[0] == pytest.approx(SPEED_M_PER_S * gone_s, abs=1.1 * SPEED_M_PER_S * 1e-3)
+    rig.go([0.5, 0.5, 0.5], 1000 if name == "ball" else 90)
+    assert client.port.follower.goal_m[0] == pytest.approx(SPEED_M_PER_S * 0.1, rel=1e-6)
+
+
+def test_an_orientation_that_is_said_again_has_turned_on() -> None:
+    rig = Rig(BALL, axes="xyz")
+    client = Client(rig, "ball")
+    motion = {"orientation": [1.0, 0.0, 0.0, 0.0], "angular_velocity_rad_per_s": [0.0, 0.0, 2.0]}
+    moved = client.say(**motion)
+    rig.go([0.5, 0.5, 0.5], 300)
+    rig.tick.start(rig.sample)
+    client.tick += 300_000_000
+    client.say(**motion, moved_seq=moved)
+    for _ in range(300):
+        rig.go([0.5, 0.5, 0.5])
+        assert apart(client.port.turning.now, [math.cos(0.1), 0.0, 0.0, math.sin(0.1)]) < 1e-6
