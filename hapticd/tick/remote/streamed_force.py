@@ -25,7 +25,7 @@ class StreamedForce(OnePort):
         site: where it is.
     """
 
-    __slots__ = ("_goal_is_new", "_goal_n", "_now_n", "_same_s")
+    __slots__ = ("_client", "_goal_is_new", "_goal_n", "_now_n", "_same_s")
 
     def __init__(self, limits: PortLimits, site: PortSite) -> None:
         super().__init__(limits, site)
@@ -33,6 +33,7 @@ class StreamedForce(OnePort):
         self._goal_n = [0.0] * len(self.channels)
         self._now_n = [0.0] * len(self.channels)
         self._same_s = 0.0
+        self._client = 0
         self._goal_is_new = False
 
     def set_ramp(self, ramp_s: float) -> None:
@@ -65,6 +66,9 @@ class StreamedForce(OnePort):
         if goal_n != self._goal_n or not any(goal_n):
             self._same_s = 0.0
             self._goal_is_new = True
+        if update.client != self._client:  # it has chosen that itself, the same or not
+            self._client = update.client
+            self._same_s = 0.0
         self._goal_n = goal_n
         return not self._stands_too_long()
 

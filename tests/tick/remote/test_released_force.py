@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from hapticd.remote.leased_port import LeasedPort, Sender
 from hapticd.tick.remote.port import PortState
 from tests.tick.remote.rig import FORCE_PORT, Rig, update
 
@@ -39,6 +40,25 @@ def test_after_letting_go_the_same_force_is_a_new_one() -> None:
         rig.say("field", force_n=[1.0])
         rig.go(ticks=10)
     assert rig.force == [1.0]
+
+
+def test_another_client_may_say_the_same_force_as_one_that_hung() -> None:
+    """The next program, after one that was killed, pushed with nothing until it said another force."""
+    rig = Rig(FORCE_PORT)
+    port = rig["field"]
+    process = LeasedPort(port.limits, 1.0)
+    states = []
+    for name, at_s in ((b"one", 0), (b"two", 10)):
+        client = Sender(name, 7, 70, True, "user 1000, process 1")
+        for number in range(150):
+            process.take({"seq": number, "force_n": [1.0]}, client, 1, at_s * 10**9 + number * 10**7)
+            port.take(process.update)
+            rig.go(ticks=10)
+            states.append(port.state)
+        rig.go(ticks=100)
+        assert rig.force == [0.0]
+    assert (states[98], states[149]) == (PortState.HELD, PortState.STALE)
+    assert states[150:] == states[:150]
 
 
 def released(rig: Rig) -> None:
