@@ -173,16 +173,8 @@ class ControlTick:
         motion = self.motion
         guard = self.guard
         sight = self.sight
-        passed_s, periods = self.period_s, 1.0
-        if not self._simulated:
-            passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
-            periods = passed_s / self.period_s
-            if self.just_armed:
-                self.just_armed = False
-                if periods > 1.0:  # enabling the device took that, without force
-                    for port in self.ports:
-                        port.miss_time(passed_s - self.period_s)
-                    passed_s, periods = self.period_s, 1.0
+        passed_s = self.period_s if self._simulated else self._passed(clock_dt_s)
+        periods = passed_s / self.period_s
         seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
             self._change_walls(periods)
@@ -349,6 +341,17 @@ class ControlTick:
             totals.ledger.absorb(contact.ledger)
         if self.has_ports:
             self.own_ports.add_totals(totals)
+
+    def _passed(self, clock_dt_s: float) -> float:
+        """Time that a tick of a real device counts for [s]: the first one after an arm no more than a period."""
+        passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
+        if self.just_armed:
+            self.just_armed = False
+            if passed_s > self.period_s:  # enabling the device took that, without force
+                for port in self.ports:
+                    port.miss_time(passed_s - self.period_s)
+                return self.period_s
+        return passed_s
 
     def _change_walls(self, periods: float) -> None:
         """Bring changes of walls into force whose time has come: on a real device by a ramp."""

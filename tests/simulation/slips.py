@@ -43,7 +43,9 @@ PREPARED = (Prepared, "_segments")
 APART = {
     "ControlTick.step": {
         "if guard.mode is not _DISARMED:": "stops for speed and for a frozen device, which a simulation has not",
-        "if not self._simulated:": "time on a real device; tests/tick/test_tick_time.py",
+        "passed_s = self.period_s if self._simulated else self._passed(clock_dt_s)": (
+            "time on a real device; tests/tick/test_tick_time.py"
+        ),
         "waiting.hold(periods)": "a simulated device does not repeat a sample",
         "self._see_again()": "after a position that was not possible the kernel has ended",
         "if not seen or sight.gain > 0.0:": "the same",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Generator, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, cast
@@ -158,16 +157,8 @@ class SpaceTick(ControlTick):
         motion = self.motion
         guard = self.guard
         sight = self.sight
-        passed_s, periods = self.period_s, 1.0
-        if not self._simulated:
-            passed_s = clock_dt_s if 0.0 <= clock_dt_s < math.inf else 0.0
-            periods = passed_s / self.period_s
-            if self.just_armed:
-                self.just_armed = False
-                if periods > 1.0:  # enabling the device took that, without force
-                    for port in self.ports:
-                        port.miss_time(passed_s - self.period_s)
-                    passed_s, periods = self.period_s, 1.0
+        passed_s = self.period_s if self._simulated else self._passed(clock_dt_s)
+        periods = passed_s / self.period_s
         seen = motion.see(sample, clock_dt_s, passed_s, sight.blind)
         if self._changing:
             self._change_walls(periods)
