@@ -489,6 +489,7 @@ class ControlTick:
     def _start_laws(self, laws: list[tuple[Contact, RunningLaw]]) -> list[tuple[Contact, RunningLaw]]:
         """Start each law where its contact is now, and hand them back; nothing else has changed yet."""
         velocity_m_per_s = self.motion.velocity_m_per_s
+        self.own_ports.share_debts()
         for contact, law in laws:
             law.start(contact.snapshot(velocity_m_per_s[contact.wall.axis]))
         return laws

@@ -95,17 +95,13 @@ class SpaceMachine:
                     instead={
                         "self.normal": "self.channels[0]",
                         "proxy.voxels": "NO_VOXELS",
-                        "channel.snapshot()": "channel.snapshot(0.0, self.ledger)",
+                        "channel.snapshot()": "channel.snapshot(0.0)",
                     },
                     without=("normal",),
                 ),
                 Channel: Form(
                     ("rest", "see", "apply", "act", "snapshot"),
-                    instead={
-                        "self.ledger.debt_j": "ledger.debt_j",
-                        **{f"law.{name}": value for name, value in published.items()},
-                    },
-                    takes={"snapshot": ("ledger",)},
+                    instead={f"law.{name}": value for name, value in published.items()},
                     without=("ledger",),
                 ),
                 RunningLaw: Form(given={"step": _step, "start": _start}),

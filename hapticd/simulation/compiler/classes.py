@@ -38,7 +38,6 @@ class Form:
         attributes: names of its properties.
         instead: an expression of its source, as Python writes it, to the one that stands there when compiled.
         given: functions to put in the place of methods.
-        takes: further parameters of a method, by its name.
         without: fields that are left out, since the object is reached another way.
         kinds: types of its fields, where those of an example may be others.
     """
@@ -47,7 +46,6 @@ class Form:
     attributes: tuple[str, ...] = ()
     instead: Mapping[str, str] = field(default_factory=dict)
     given: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
-    takes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     without: tuple[str, ...] = ()
     kinds: Mapping[str, type[Any]] = field(default_factory=dict)
 
@@ -83,9 +81,9 @@ class Machine:
         for cls, form in forms.items():
             own = _OF_MARK[self._marks[cls]]
             for name in form.methods:
-                own[name] = self._rewritten(inspect.getattr_static(cls, name), form, form.takes.get(name, ()))
+                own[name] = self._rewritten(inspect.getattr_static(cls, name), form)
             for name in form.attributes:
-                own[name] = self._rewritten(inspect.getattr_static(cls, name).fget, form, ())
+                own[name] = self._rewritten(inspect.getattr_static(cls, name).fget, form)
             for name, function in form.given.items():
                 own[name] = self.compiled(function)
 
@@ -121,7 +119,7 @@ class Machine:
         if function not in self._memo:
             assert isinstance(function, FunctionType)
             if function.__module__ in self._modules:
-                return self._rewritten(function, Form(), (), options)
+                return self._rewritten(function, Form(), options)
             names = dict(function.__globals__)
             copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
             copy.__module__ = function.__module__
@@ -137,7 +135,7 @@ class Machine:
                 names[name] = self.compiled(names[name])
         return machine
 
-    def _rewritten(self, function: Any, form: Form, takes: tuple[str, ...], options: Mapping[str, Any] = INNER) -> Any:
+    def _rewritten(self, function: Any, form: Form, options: Mapping[str, Any] = INNER) -> Any:
         assert isinstance(function, FunctionType)
         tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
         definition = tree.body[0]
@@ -146,7 +144,6 @@ class Machine:
         definition.returns = None
         for argument in definition.args.args:
             argument.annotation = None
-        definition.args.args += [ast.arg(name) for name in takes]
         definition.args.defaults = []
         tree = _OnRecords(self._methods, self._attributes).visit(_Instead(form.instead).visit(tree))
         ast.fix_missing_locations(tree)

@@ -20,7 +20,7 @@ from hapticd.tick.remote.port import Port, PortState
 from hapticd.tick.remote.port_site import PortSite
 from hapticd.tick.remote.ramped import Ramped
 from hapticd.tick.remote.update import Update
-from hapticd.tick.space.channel import LEAST_M, Channel
+from hapticd.tick.space.channel import LEAST_M, Channel, share_debt
 
 OUTSIDE_S = 0.5
 """How long a law that keeps time outside is asked after its port was let go [s]."""
@@ -215,6 +215,10 @@ class OnePort(Port):
         if self.weight == 0.0 and self.state is not _HELD and self._is_quiet():
             self._sleep()
 
+    def share_debt(self) -> None:
+        """Have the axes know what each of them owes, for laws that start now."""
+        share_debt(self.channels, self.books.ledger.debt_j)
+
     @property
     def work_j(self) -> float:
         """What the client's motion, changes and forces have put in, less what they took [J]."""
@@ -265,7 +269,9 @@ class OnePort(Port):
         """Enter a tick into the books: first the motion, then what has become of the port."""
         x_squared = taken_j = spring_j = 0.0
         for channel in self.channels:
-            taken_j -= channel.applied_n * channel.way_m
+            given_j = channel.applied_n * channel.way_m
+            channel.taken_j -= given_j
+            taken_j -= given_j
             spring_j -= channel.held_n * channel.way_m
             x_squared += channel.x_of_law_m * channel.x_of_law_m
         stretch_m = sqrt(x_squared)
@@ -332,6 +338,8 @@ class OnePort(Port):
         if not self._begun:
             self._begun = self._comes_in = True
             moved_s = 0.0
+            for channel in self.channels:
+                channel.taken_j = 0.0
             self._begin()
             self._from_m[:] = position_m
         self._waits = False
@@ -348,6 +356,7 @@ class OnePort(Port):
         for axis, channel in enumerate(self.channels):
             way_m = self.motion.position_m[axis] - self._from_m[axis]
             more_n, more_spring_n, more_own_n = channel.spread(periods)
+            channel.taken_j -= more_n * way_m
             taken_j -= more_n * way_m
             spring_j -= more_spring_n * way_m
             own_j -= more_own_n * way_m

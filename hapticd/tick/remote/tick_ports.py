@@ -85,6 +85,11 @@ class TickPorts:
         for port in self.couplings:
             port.set_ramp(ramp_s)
 
+    def share_debts(self) -> None:
+        """Have the axes of each port know what they owe, for laws that start now."""
+        for port in (*self.couplings, *self._leaving):
+            port.share_debt()
+
     def add_totals(self, totals: Totals) -> None:
         """Add the books of all there ever were."""
         totals.add(self._past)

@@ -45,9 +45,11 @@ class Channel(Contact):
     Attributes:
         dx, dy, dz: the direction along which its force acts, a unit vector.
         way_m: since the last sample, along the direction of then [m].
+        taken_j: energy that this direction took since the touch, kept of all but the first, which has the rest [J].
+        owed_j: its part of what all directions owe, as shared out last [J].
     """
 
-    __slots__ = ("dx", "dy", "dz", "velocity_m_per_s", "way_m", "x_of_law_m")
+    __slots__ = ("dx", "dy", "dz", "owed_j", "taken_j", "velocity_m_per_s", "way_m", "x_of_law_m")
 
     def __init__(self, law: RunningLaw, resolution_m: float, ledger: EnergyLedger) -> None:
         super().__init__(Direction(), law, resolution_m)  # type: ignore[arg-type]  # stands for a wall, see there
@@ -57,6 +59,7 @@ class Channel(Contact):
         self.velocity_m_per_s = 0.0
         self.x_of_law_m = 0.0
         self.way_m = 0.0
+        self.taken_j = self.owed_j = 0.0
 
     @property
     def held_n(self) -> float:
@@ -83,9 +86,7 @@ class Channel(Contact):
     def snapshot(self, velocity_m_per_s: float = 0.0) -> LawSnapshot:
         """What a law that takes over now starts from; the velocity is its own."""
         learned_n_s_per_m = self.damping_n_s_per_m if self.law.learns_damping else 0.0
-        return LawSnapshot(
-            self.x_of_law_m, self.velocity_m_per_s, self.applied_n, self.ledger.debt_j, learned_n_s_per_m
-        )
+        return LawSnapshot(self.x_of_law_m, self.velocity_m_per_s, self.applied_n, self.owed_j, learned_n_s_per_m)
 
     def take_law(self, law: RunningLaw, velocity_m_per_s: float, dt_s: float) -> None:
         """Go on with another law, already started; the caller blends. The velocity is its own."""
@@ -225,7 +226,9 @@ def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: 
     if dt_s > 0.0:
         taken_j = spring_j = 0.0
         for channel in channels:
-            taken_j -= channel.mean_n * channel.way_m
+            given_j = channel.mean_n * channel.way_m
+            channel.taken_j -= given_j
+            taken_j -= given_j
             spring_j -= channel.mean_spring_n * channel.way_m
         lost_j = stiffness_n_per_m * proxy.lost_m2
         ledger = contact.ledger
@@ -241,6 +244,28 @@ def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: 
         held *= limit_n / (solid.stiffness_n_per_m * stretch_m)
     for channel in channels:
         channel.apply(share, held * channel.wall.spring_n)
+
+
+def share_debt(channels: Sequence[Channel], debt_j: float) -> None:
+    """Have each direction owe its part of what all do: once in all, where it was given.
+
+    One that took more than it gave owes nothing, and what it took lessens the parts of the others alike.
+
+    Args:
+        channels: of a solid or a port, which share its books.
+        debt_j: what it owes [J].
+    """
+    first = channels[0]
+    first.taken_j = -debt_j
+    for channel in channels[1:]:
+        first.taken_j -= channel.taken_j
+    given_j = 0.0
+    for channel in channels:
+        channel.owed_j = max(0.0, -channel.taken_j)
+        given_j += channel.owed_j
+    if given_j > 0.0:
+        for channel in channels:
+            channel.owed_j *= debt_j / given_j
 
 
 def stretched_m(proxy: Any) -> float:

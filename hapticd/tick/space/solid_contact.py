@@ -15,7 +15,7 @@ from hapticd.shapes.proxy import follow, place, place_before
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
-from hapticd.tick.space.channel import Channel, lay_along, settle_along, slip_along, stretched_m
+from hapticd.tick.space.channel import Channel, lay_along, settle_along, share_debt, slip_along, stretched_m
 from hapticd.tick.space.crease import TURNED, grip
 from hapticd.tick.space.solid import Solid
 
@@ -86,9 +86,7 @@ class SolidContact:
         self.channels += self.rougher(solid, make_law)
         self.quiet = True
         self.leaving = False
-        self.moved_j = 0.0
-        self.friction_j = 0.0
-        self.friction_stored_j = 0.0
+        self.moved_j = self.friction_j = self.friction_stored_j = 0.0
         self.depth_m = 0.0
         self._away = False
         self._moved_m = 0.0
@@ -223,6 +221,8 @@ class SolidContact:
         if not normal.in_contact:  # the way to the surface counts along its normal
             self.quiet = False
             normal.dx, normal.dy, normal.dz = nx, ny, nz
+            for channel in self.channels:
+                channel.taken_j = 0.0
         self._moved_m = moved_m = normal.dx * wx + normal.dy * wy + normal.dz * wz
         if solid.creases:
             before = self.grip
@@ -264,6 +264,7 @@ class SolidContact:
             normal = self.normal
             self._ux, self._uy, self._uz = normal.dx, normal.dy, normal.dz
             self.turned = False
+            share_debt(self.channels, self.ledger.debt_j)
             for channel in self.channels[: self.sides]:
                 if channel.law.publishes_mass:
                     channel.law.start(channel.snapshot())

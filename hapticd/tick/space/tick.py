@@ -19,6 +19,7 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Guard, Mode
 from hapticd.tick.remote.tick_ports import MakePort
 from hapticd.tick.space.books import SpaceBooks, Totals
+from hapticd.tick.space.channel import share_debt
 from hapticd.tick.space.solid import Solid, at_once, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
 from hapticd.tick.space.switch import SpaceSwitch
@@ -260,6 +261,11 @@ class SpaceTick(ControlTick):
 
     def _fading_out(self) -> list[Contact]:
         return [*self.leaving, *(channel for contact in self.fading for channel in contact.channels)]
+
+    def _start_laws(self, laws: list[tuple[Contact, RunningLaw]]) -> list[tuple[Contact, RunningLaw]]:
+        for contact in self.solids:
+            share_debt(contact.channels, contact.ledger.debt_j)
+        return super()._start_laws(laws)
 
     def _stand(self) -> None:
         super()._stand()
