@@ -216,8 +216,17 @@ static inline double damping_cap(law_state *s, const law_params *p) {
     return cap;
 }
 
+static inline void begin_inside(law_state *s, const law_tick *t) {
+    double start = s->lowest_m;
+    if (t->in_contact && start * t->x_m > 0.0) {
+        begin(s, s->energy_j + bounded(0.5 * fabs(t->spring_n * start) * fabs(start / t->x_m)));
+        s->was_in_contact = true;
+    }
+}
+
 static inline double law_step(law_state *s, const law_params *p, const law_tick *t) {
     if (p->cap == CAP_FELT_MASS || p->force_delay == FORCE_DELAY_IDENTIFIED) feel(s, p, t);
+    if (s->period_s == 0.0) begin_inside(s, t);
     if (keep_period(s, t->dt_s)) s->damping_n_s_per_m = s->uncut_n_s_per_m;
     if (t->in_contact && !s->was_in_contact && p->new_contact != NEW_CONTACT_KEEP) {
         begin(s, 0.0);

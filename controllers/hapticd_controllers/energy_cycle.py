@@ -125,6 +125,8 @@ def step(state: Any, params: Any, tick: Any) -> float:
     """The contact's own force plus the damping that past cycles called for.  -> force on the device [N]."""
     if params.cap == CAP_FELT_MASS or params.force_delay == FORCE_DELAY_IDENTIFIED:
         feel(state, tick, params.felt_mass_memory)
+    if state.period_s == 0.0:
+        _begin_inside(state, tick)
     if keep_period(state, tick.dt_s):  # the first one's may hold the time of enabling: its cap does not stay
         state.damping_n_s_per_m = state.uncut_n_s_per_m
     if tick.in_contact and not state.was_in_contact and params.new_contact != NEW_CONTACT_KEEP:
@@ -161,6 +163,15 @@ def step(state: Any, params: Any, tick: Any) -> float:
     if not params.wall_may_pull and (force_n > 0.0 if tick.x_m > 0.0 else force_n < 0.0):
         force_n = 0.0  # along a surface a spring is stretched either way
     return force_n
+
+
+def _begin_inside(state: Any, tick: Any) -> None:
+    """At the first sample: what a spring held that was pressed at the start is no gain when it comes back."""
+    start_m = state.lowest_m
+    if tick.in_contact and start_m * tick.x_m > 0.0:
+        stored_j = _bounded(0.5 * abs(tick.spring_n * start_m) * abs(start_m / tick.x_m))
+        begin(state, state.energy_j + stored_j)
+        state.was_in_contact = True
 
 
 def _count_energy(state: Any, params: Any, tick: Any) -> None:
