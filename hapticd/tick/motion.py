@@ -16,7 +16,7 @@ MOST_S = 1.0
 NEW_SHARE = 0.05
 LONGER = 2.0
 """Share of a new time between samples in the usual one, which it counts at most so many times of, and how much shorter
-than that no time between samples of a device without a clock is."""
+than that no time between samples is, whosever clock tells it."""
 
 MOST_M = 1e7
 MOST_M_PER_S = 1e6
@@ -71,9 +71,11 @@ class Motion:
         "_has_clock",
         "_has_sequence",
         "_period_s",
+        "_ran_back",
         "_sequence",
         "_usual_s",
         "_waited_s",
+        "_was_short",
         "dt_s",
         "estimators",
         "origin_m",
@@ -120,12 +122,15 @@ class Motion:
         self.time_ns = -1
         self._sequence = -1
         self._waited_s = 0.0
-        self._usual_s = period_s  # between samples of a device without a clock
+        self._ran_back = False  # the device's clock, since the last sample that was taken in
+        self._usual_s = period_s  # between samples
+        self._was_short = False
 
     def start(self, sample: Sample) -> bool:
         """Begin at a sample, at rest; False when it makes no sense, and it is not known where the device is."""
         self.time_ns = sample.time_ns
         self._sequence = sample.sequence
+        self._ran_back = False
         if not self._is_possible(sample):
             return False
         for axis in self._axes:
@@ -152,17 +157,24 @@ class Motion:
             self._waited_s += clock_dt_s
             dt_s = 0.0
             if not repeats:
-                dt_s = self._between(self._waited_s)
+                dt_s = self._waited_s
                 self._waited_s = 0.0
         if repeats:
             self.repeated += 1
             self.repeated_s += passed_s
+            if dt_s < 0.0:
+                self._ran_back = True
             if not at_rest:
                 self.dt_s = 0.0
                 return self._is_possible(sample)
-        elif self.repeated:
-            self.repeated = 0
-            self.repeated_s = 0.0
+        else:
+            if self.repeated:
+                if self._ran_back:  # how long that was, this computer's clock tells
+                    self._ran_back = False
+                    dt_s = self.repeated_s + passed_s
+                self.repeated = 0
+                self.repeated_s = 0.0
+            dt_s = self._between(dt_s)
         if LEAST_S <= dt_s < MOST_S:
             self.dt_s = dt_s
         else:
@@ -193,16 +205,21 @@ class Motion:
         self.speed_squared = speed_squared
         return True
 
-    def _between(self, waited_s: float) -> float:
-        """Time between two samples of a device without a clock, from that between the ticks that read them [s].
+    def _between(self, dt_s: float) -> float:
+        """Time between two samples, as far as it can be believed [s].
 
-        The tick after a late one comes early, and what the device has by then is a whole sample newer: it would have
-        moved at ten times its speed.
+        No clock tells it of each sample alone. The tick after a late one comes early, and what a device without a clock
+        has by then is a whole sample newer; a device's own clock may be set or jitter. Else a count of the position
+        would be a blow. Short ones in a row are another rate.
         """
-        if not LEAST_S <= waited_s < MOST_S:
-            return waited_s
-        self._usual_s += NEW_SHARE * (min(waited_s, LONGER * self._usual_s) - self._usual_s)
-        return max(waited_s, self._usual_s / LONGER)
+        if not LEAST_S <= dt_s < MOST_S:
+            return dt_s
+        short = dt_s * LONGER < self._usual_s
+        if short and self._was_short:
+            self._usual_s /= LONGER
+        self._was_short = short
+        self._usual_s += NEW_SHARE * (min(dt_s, LONGER * self._usual_s) - self._usual_s)
+        return max(dt_s, self._usual_s / LONGER)
 
     @property
     def frozen(self) -> bool:

@@ -64,6 +64,84 @@ def test_while_the_clock_stands_still_the_last_velocity_stands() -> None:
     assert rig.tick.motion.velocity_m_per_s == [pytest.approx(1.0)]
 
 
+@pytest.mark.parametrize("back_s", [3600.0, 1.0, 1.2e-3])
+@pytest.mark.parametrize("stood", [0, 3])
+def test_a_clock_that_is_set_back_doubles_no_speed(back_s: float, stood: int) -> None:
+    """The sample after it tells of the way of two, and also of those in which the clock had stood still before."""
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True, safety={"max_speed_m_per_s": 0.6})
+    places = iter(0.5e-3 * n for n in range(1, 100))
+    for _ in range(5):
+        rig.force(next(places))
+    for _ in range(stood):
+        next(places)
+        rig.tick.step(rig.sample, PERIOD_S)
+    rig.sample.time_ns -= round(back_s * 1e9)
+    rig.sample.position_m[0] = next(places)
+    rig.tick.step(rig.sample, PERIOD_S)
+    assert rig.tick.motion.dt_s == 0.0
+    for _ in range(5):
+        rig.force(next(places))
+        assert rig.tick.motion.velocity_m_per_s == [pytest.approx(0.5)]
+    assert rig.tick.fault == 0
+
+
+def test_a_clock_that_stood_still_and_goes_on_is_believed() -> None:
+    """Only after one that ran back this computer's own counts."""
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True)
+    rig.force(1e-3)
+    rig.force(1e-3, dt_s=-5.0)
+    rig.force(2e-3)
+    rig.force(2e-3, dt_s=0.0)
+    rig.force(5e-3, dt_s=6e-3)
+    assert rig.tick.motion.velocity_m_per_s == [pytest.approx(0.5)]
+
+
+def test_a_device_that_begins_anew_has_a_clock_that_never_ran_back() -> None:
+    motion = Motion(VelocityConfig(), device(has_clock=True), PERIOD_S)
+    sample = Sample(1)
+    sample.time_ns = 10**9
+    assert motion.start(sample)
+    sample.time_ns = 0
+    assert motion.see(sample, PERIOD_S, PERIOD_S, at_rest=False)
+    assert motion.start(sample)
+    sample.time_ns, sample.position_m[0] = 4_000_000, 2e-3
+    assert motion.see(sample, PERIOD_S, PERIOD_S, at_rest=False)
+    assert motion.velocity_m_per_s == [pytest.approx(0.5)]
+
+
+@pytest.mark.parametrize("step_s", [1e-9, 2e-6, 1e-4])
+def test_a_step_of_the_clock_that_is_hardly_one_makes_no_blow_of_a_count(step_s: float) -> None:
+    """10 um in 2 us are 5 m/s, which under a damper of 50 N s/m is 250 N."""
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True, safety={"max_speed_m_per_s": 1.0})
+    rig.force(0.0, ticks=100)
+    rig.force(1e-5, dt_s=step_s)
+    assert rig.tick.motion.velocity_m_per_s[0] == pytest.approx(0.02, rel=0.1)
+    assert rig.tick.motion.dt_s == pytest.approx(0.5e-3, rel=0.1)
+    assert rig.tick.fault == 0
+    rig.force(2e-5)
+    assert rig.tick.motion.velocity_m_per_s[0] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("has_clock", [True, False])
+@pytest.mark.parametrize(("slow_s", "samples"), [(3e-3, 1), (5e-3, 2), (10e-3, 3)])
+def test_short_times_in_a_row_are_another_rate_which_is_followed(has_clock: bool, slow_s: float, samples: int) -> None:
+    """Each of them halves what is believed. A computer that was busy for a while reads in time again, too."""
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=has_clock)
+    rig.force(0.0, ticks=200, dt_s=slow_s)
+    rig.at(0.0, ticks=samples - 1)
+    rig.force(1e-4)
+    assert rig.tick.motion.dt_s > 1.05 * PERIOD_S
+    rig.force(2e-4)
+    assert rig.tick.motion.velocity_m_per_s == [pytest.approx(0.1)]
+
+
+def test_short_times_that_are_not_in_a_row_are_none() -> None:
+    rig = Rig(wall(2000.0), at_m=0.0, has_clock=True)
+    for n in range(50):
+        rig.force(1e-5 * (n % 2), dt_s=2e-6 if n % 2 else 2e-3)
+        assert rig.tick.motion.dt_s > 0.4e-3
+
+
 def test_a_device_that_is_too_fast_is_let_go_by_a_ramp() -> None:
     rig = Rig(wall(2000.0), at_m=0.0, safety={"max_speed_m_per_s": 1.0})
     rig.force(-0.9e-3)
