@@ -97,7 +97,8 @@ def stop(
 ) -> None:
     """Ramp the force of a running daemon to zero and end it.
 
-    Returns when a daemon of this computer has ended. A service stays off until it is started again.
+    Returns when a daemon of this computer has ended; where its device did not let go, the error says so. A service
+    stays off until it is started again.
 
     Example: hapticd stop --instance left
     """

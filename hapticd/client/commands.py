@@ -19,9 +19,14 @@ TIMEOUT_S = 5.0
 GRACE_S = 1.0
 """How long the answer that a request came too late may take [s]."""
 
+STOP_TIMEOUT_S = 15.0
+"""How long a daemon may take to end its loop, and to see that the force is gone where its driver hangs [s]."""
+
 CALIBRATION_TIMEOUT_S = 120.0
 """How long a device may take to calibrate [s]."""
 
+
+_LOOK_S = 0.1  # how often it is seen whether the daemon is still there
 
 _LATER = ("arm", "calibrate", "tare", "clear")  # what may have to wait, and must not be done when it is too late
 
@@ -39,7 +44,7 @@ class RefusedConfigError(RefusedError):
 def command(
     do: str,
     instance: str = DEFAULT_INSTANCE,
-    timeout_s: float = TIMEOUT_S,
+    timeout_s: float | None = None,
     connect: str | None = None,
     keys: Path | None = None,
     **fields: bool | float | str,
@@ -52,7 +57,7 @@ def command(
     Args:
         do: `status`, `receipt`, `arm`, `disarm`, `calibrate`, `tare`, `clear`, `mark`, `reload` or `stop`.
         instance: which daemon on this computer, when no endpoint is given.
-        timeout_s: how long the daemon may be silent [s].
+        timeout_s: how long the daemon may be silent [s]; None: `TIMEOUT_S`, to stop `STOP_TIMEOUT_S`.
         connect: the daemon's `control.tcp` as seen from here, such as "tcp://lab.example:9873".
         keys: key file for it; None: the one that $HAPTICD_KEYS names.
         fields: what else belongs to the request: the `text` of `mark`; `wait=True` makes `reload` answer with its
@@ -65,10 +70,12 @@ def command(
     Raises:
         ConfigError: the key file cannot be used.
         EndpointError: ZeroMQ cannot use the endpoint.
-        InstanceError: no daemon answers there, or two daemons of this name run.
+        InstanceError: no daemon answers there, it ended before it answered, or two daemons of this name run.
         RefusedKeyError: commands over TCP take a key that the daemon lists.
         RefusedError: it answers that it will not.
     """
+    if timeout_s is None:
+        timeout_s = STOP_TIMEOUT_S if do == "stop" else TIMEOUT_S
     if connect is None:
         place = locate(CONTROL, instance)
         endpoint = f"ipc://{place}"
@@ -142,6 +149,7 @@ class _Talk:
         """The answer to a request.
 
         Raises:
+            InstanceError: none will come.
             RefusedError: a text of it is no UTF-8.
             SilenceError: none came, or for a verdict on a configuration not even a sign of life.
         """
@@ -152,7 +160,7 @@ class _Talk:
         patient = request["do"] == "reload"
         silent = False
         while True:
-            if self._connection.wait(self._timeout_s + GRACE_S):
+            if self._wait(request["do"]):
                 answer: dict[str, Any] = msgpack.unpackb(self._socket.recv(), unicode_errors="surrogateescape")
                 if patient and "status" in answer:
                     silent = False
@@ -162,6 +170,23 @@ class _Talk:
                 raise SilenceError("no answer")
             silent = True
             self._socket.send(msgpack.packb({"do": "status"}))
+
+    def _wait(self, do: str) -> bool:
+        """Whether a message has come in time; a daemon that has ended is not waited for.
+
+        Raises:
+            InstanceError: none will come.
+        """
+        until_s = time.monotonic() + self._timeout_s + GRACE_S
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            if self._connection.wait(min(left_s, _LOOK_S)):
+                return True
+            if self._connection.lost and not self._connection.wait(GRACE_S) and self._connection.lost:
+                force = " and what became of the force" if do in ("disarm", "stop") else ""
+                raise InstanceError(
+                    f"{do}: the daemon ended, or its connection, before it answered; its log says why{force}"
+                )
+        return False
 
 
 def calibrate(instance: str = DEFAULT_INSTANCE, connect: str | None = None, keys: Path | None = None) -> None:

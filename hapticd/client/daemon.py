@@ -178,7 +178,10 @@ class DaemonClient(Client):
         return RemotePort(name, scene, state, self._keys)
 
     def stop(self) -> None:
-        """Have the daemon ramp the force out and end. As a service it stays off until it is started again."""
+        """Have the daemon ramp the force out and end. As a service it stays off until it is started again.
+
+        Returns when the force is gone. Raises `RefusedError` where the device did not let go.
+        """
         self._ask("stop")
 
     def _join(self) -> None:

@@ -25,6 +25,7 @@ _NEWS = (
     | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
     | zmq.EVENT_HANDSHAKE_FAILED_AUTH
     | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
+    | zmq.EVENT_DISCONNECTED
 )
 
 
@@ -65,11 +66,13 @@ class CurveClient:
     Attributes:
         doubt: what is wrong with what answers there, empty when nothing is.
         connected: something there has spoken ZeroMQ with this client.
+        lost: it was connected, and is not any more; ZeroMQ tries again.
     """
 
     def __init__(self, socket: zmq.Socket[bytes], endpoint: str, keys: Key | None) -> None:
         self.doubt = ""
         self.connected = False
+        self.lost = False
         self._socket = socket
         self._endpoint = endpoint
         self._keys = keys
@@ -132,6 +135,9 @@ class CurveClient:
         if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
             self.doubt = ""
             self.connected = True
+            self.lost = False
+        elif event == zmq.EVENT_DISCONNECTED:
+            self.lost = self.connected
         elif event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL and self._keys is not None:
             self.doubt = "; what answers there lacks the server-key of your key file, or is another kind of endpoint"
         elif event == zmq.EVENT_HANDSHAKE_FAILED_AUTH and value == _REFUSED:

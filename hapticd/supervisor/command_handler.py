@@ -58,9 +58,18 @@ class CommandHandler:
                     state.ask_reload()
                 case "stop":
                     state.stop_reason = state.stop_reason or "asked over the control socket"
-                    reply(True)
+                    state.requests.hold(_answering(reply))  # until it is known what became of the force
                 case other:
                     reply(False, f"cannot do {other[:40]!r}; known: {', '.join(KNOWN)}")
+
+    def end(self, force_left: str) -> None:
+        """Answer all that wait, and what has come meanwhile: the loop has ended.
+
+        Args:
+            force_left: why the force may still be there; "" when it is gone.
+        """
+        self.turn()
+        self._state.requests.abandon("the daemon has stopped", force_left)
 
     def disarm(self, answer: Answer | None = None) -> None:
         """Have the loop let go; without a device see that the next one is not armed by itself.

@@ -224,8 +224,9 @@ class Daemon:
             await asyncio.sleep(pause_s(state.publisher.flush_due_ns, time.monotonic_ns()))
         self._end_force(state.loop)  # one that lost its device may hang, and no record is to be waited for before
         state.recovery.stop()
-        state.requests.abandon("the daemon has stopped", self._force_left())
+        self._handler.end(self._force_left())
         state.event_log.close(state.config, state.loop, RECORD_TIMEOUT_S)
+        self._handler.end(self._force_left())  # for who has asked while that took its time
         return self.exit_code
 
     def _turn(self) -> None:

@@ -43,7 +43,7 @@ class RequestQueue:
         self._calibrating = False
         self._disarming: deque[tuple[int, Answer]] = deque()  # each by the number of its request
         self._disarmed: deque[tuple[int, Answer]] = deque()  # each by the record that was the newest then
-        self._held: list[Answer] = []  # to disarm, until it is known what became of the force
+        self._held: list[Answer] = []  # to disarm or stop, until it is known what became of the force
 
     def submit(self, request: dict[str, Any], answer: Answer, by_ns: int | None = None) -> None:
         """Queue a request; its answer comes from a later `turn`.
@@ -109,7 +109,7 @@ class RequestQueue:
                         self.submit(other.request, other.answer)
 
     def abandon(self, why: str, force_left: str | None = "") -> None:
-        """Answer all that wait: the loop is gone; who asked to disarm asks for its force, and hears of that.
+        """Answer all that wait: the loop is gone; who asked to disarm or stop asks for its force, and hears of that.
 
         Args:
             why: the answer to all others.
@@ -133,11 +133,11 @@ class RequestQueue:
             self.settle(force_left)
 
     def hold(self, answer: Answer) -> None:
-        """Have somebody who asks to disarm, while the loop is gone already, wait for `settle`."""
+        """Have somebody wait for `settle`: who asks to stop, or to disarm while the loop is gone already."""
         self._held.append(answer)
 
     def settle(self, force_left: str) -> None:
-        """Answer those who asked to disarm: what became of the force of a loop that is gone is known.
+        """Answer those who asked to disarm or stop: what became of the force of a loop that is gone is known.
 
         Args:
             force_left: why it may still be there; "" when it is gone.

@@ -112,7 +112,7 @@ class Daemon:
             control.connect(f"ipc://{self.directory}/run/default/control")
             control.send(msgpack.packb({"do": do}))
             while not control.poll(200):
-                assert self.process.poll() is None, f"the daemon ended: {self.output()}"
+                assert self.process.poll() is None or control.poll(200), f"the daemon ended: {self.output()}"
                 assert time.monotonic() < end_s, f"no answer to {do}: {self.output()}"
             answer = msgpack.unpackb(control.recv())
         return "" if answer["ok"] else str(answer["text"])

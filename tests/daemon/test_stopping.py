@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from hapticd.client.commands import command
 from hapticd.config.loading import parse
 from hapticd.supervisor import daemon as supervising
-from tests.daemon.running import Daemon, gone, wait_until
+from tests.daemon.running import HAPTICD, Daemon, gone, wait_until
 from tests.daemon.test_deaths import PRESSED, nothing_left, pressing
 from tests.faults.rig import Rig
 
@@ -51,6 +56,16 @@ class Clinging(Loopback):
         if clings.exists() and Path(sys.argv[0]).stem in clings.read_text().split():
             raise OSError("no answer")
         super()._disable()
+class Stubborn(Loopback):
+    """Takes longer to let go than the daemon waits, and will not from outside either."""
+    def _disable(self):
+        if not Path(__file__).with_name("clings").exists():
+            super()._disable()
+        elif Path(sys.argv[0]).stem == "process":
+            time.sleep(60.0)
+        else:
+            time.sleep(1.0)
+            raise OSError("no answer")
 '''
 
 NO_ANSWER = f"OSError: no answer (slow_devices.py:{DRIVERS[: DRIVERS.index('raise OSError')].count(chr(10)) + 1})"
@@ -62,7 +77,7 @@ def laboratory(tmp_path: Path) -> Path:
     package = tmp_path / "slow_devices-1.0.dist-info"
     package.mkdir()
     (package / "METADATA").write_text("Metadata-Version: 2.1\nName: slow-devices\nVersion: 1.0\n")
-    names = ("slow", "stuck", "noting", "clinging")
+    names = ("slow", "stuck", "stubborn", "noting", "clinging")
     points = "[hapticd.drivers]\n" + "".join(f"{name} = slow_devices:{name.capitalize()}\n" for name in names)
     (package / "entry_points.txt").write_text(points)
     return tmp_path
@@ -150,6 +165,74 @@ def test_a_force_that_the_loop_could_not_take_away_is_taken_away_from_outside(
         assert daemon.wait_exit() == 1, daemon.output()
         assert f"the control loop could not take the force away{said}\n" in daemon.output()
         assert nothing_left(daemon)
+
+
+@contextmanager
+def stopping(daemon: Daemon) -> Iterator[subprocess.Popen[str]]:
+    """`hapticd stop` under way."""
+    environment = {**os.environ, "HAPTICD_RUNTIME_DIR": str(daemon.directory / "run")}
+    with subprocess.Popen([HAPTICD, "stop"], env=environment, stdout=-1, stderr=-1, text=True) as asking:
+        yield asking
+
+
+@pytest.mark.parametrize("driver", ["clinging", "stubborn"])
+def test_all_who_ask_to_stop_a_device_that_does_not_let_go_hear_that_the_force_may_be_there(
+    laboratory: Path, driver: str
+) -> None:
+    """It exited with 0 and said nothing, and somebody put a hand on the device."""
+    with Daemon(PRESSED + f'[device]\ndriver = "{driver}"\n', pythonpath=laboratory).wait_ready() as daemon:
+        pressing(daemon)
+        (laboratory / "clings").write_text("process force_release hapticd")
+        daemon.process.send_signal(signal.SIGSTOP)  # until both have asked
+        with stopping(daemon) as one, stopping(daemon) as other:
+            time.sleep(2.0)
+            daemon.process.send_signal(signal.SIGCONT)
+            for asking in (one, other):
+                said, problem = asking.communicate()
+                assert (asking.returncode, said) == (1, "")
+                assert "the force may still be there: the device did not let go" in problem
+                assert "OSError: no answer" in problem
+        assert daemon.wait_exit() == 1, daemon.output()
+
+
+def test_who_asks_to_stop_a_device_that_is_let_go_of_from_outside_hears_that_all_is_well(laboratory: Path) -> None:
+    with Daemon(PRESSED + '[device]\ndriver = "clinging"\n', pythonpath=laboratory).wait_ready() as daemon:
+        pressing(daemon)
+        (laboratory / "clings").write_text("process")
+        with stopping(daemon) as asking:
+            assert asking.communicate() == ("", "")
+        assert asking.returncode == 0
+        assert daemon.wait_exit() == 1, daemon.output()
+
+
+def test_who_asks_while_the_daemon_ends_is_answered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fault record on a slow disk holds the end up for 3 s; the force is gone by then."""
+    monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(tmp_path))
+    daemon = supervising.Daemon(parse('[loop]\nrealtime = "off"\n', "lab.toml"), "default")
+    daemon.stop("SIGTERM")
+    asking = threading.Thread(target=command, args=("stop",))
+
+    def close(*_arguments: object) -> None:
+        asking.start()
+        time.sleep(1.0)
+
+    monkeypatch.setattr(daemon.state.event_log, "close", close)
+    failed: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", failed.append)
+    assert daemon.run() == 0
+    asking.join()
+    assert not failed
+
+
+def test_who_waits_for_a_daemon_that_is_killed_hears_of_it_and_not_that_it_does_not_answer(laboratory: Path) -> None:
+    with Daemon(PRESSED + '[device]\ndriver = "slow"\n', pythonpath=laboratory).wait_ready() as daemon:
+        with stopping(daemon) as asking:
+            wait_until(lambda: "stop: asked by" in daemon.output(), "the request")
+            daemon.process.kill()
+            _, problem = asking.communicate()
+        assert asking.returncode == 1
+        assert "the daemon ended, or its connection, before it answered" in problem
+        assert "what became of the force" in problem
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
