@@ -57,12 +57,9 @@ def _lines(one: Mapping[str, Any]) -> list[str]:
     if "problem" in one:
         return [f"{one['name']}: {one['problem']}"]
     status = Status.of(one["status"])
-    mode = "stopped by a fault" if status.latched else "armed" if status.armed else "disarmed"
-    if status.device_lost_timestamp:
-        mode = "no device"
     rate_hz = status.measured_rate_hz
     parts = (
-        mode,
+        _mode(status),
         f"law {status.law}" + (" (failed, damping instead)" if status.fallback else ""),
         f"{f'{rate_hz:.0f}' if rate_hz else '?'} of {status.rate_hz:g} Hz",
         f"{100.0 * one['late_share']:.2g} % late",
@@ -77,6 +74,15 @@ def _lines(one: Mapping[str, Any]) -> list[str]:
     lines.extend(_driven(status))
     lines.extend(f"  {warning}" for warning in status.warnings)
     return lines
+
+
+def _mode(status: Status) -> str:
+    """Whether it pushes, and why not; it does as long as it ramps the force out."""
+    if status.device_lost_timestamp:
+        return "no device"
+    if status.latched:
+        return "stopped by a fault" + (", releasing" if status.releasing else "")
+    return "releasing" if status.releasing else "armed" if status.armed else "disarmed"
 
 
 def _driven(status: Status) -> Iterator[str]:

@@ -13,10 +13,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import msgpack
+import pytest
+import typer
 import zmq
 
+from hapticd.cli.status import status as show
 from hapticd.client.commands import command
-from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, wait_until
+from tests.daemon.running import HAPTICD, PATIENCE_S, Daemon, Subscriber, wait_until
+from tests.daemon.test_deaths import PRESSED, pressing
 
 
 def status(runtime: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -87,6 +91,30 @@ def test_a_daemon_of_the_release_before_that_went_on_through_an_upgrade_is_shown
         "old: armed, law energy-cycle, ? of 1000 Hz, 0 % late",
         "  omega7, simulated, since 2023-11-15 03:43:20 +0530",
     ]
+
+
+@pytest.mark.parametrize("fault", [False, True])
+def test_a_force_that_is_being_ramped_out_is_not_called_disarmed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], fault: bool
+) -> None:
+    """It stood there at 4.9 N, for as long as the ramp took."""
+    config = f"{PRESSED}[safety]\nramp_s = 1.0\n"
+    with Daemon(config).wait_ready() as daemon, Subscriber(daemon.endpoint, "hapticd/status") as subscriber:
+        monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(daemon.directory / "run"))
+
+        def said() -> str:
+            with pytest.raises(typer.Exit):
+                show()
+            return capsys.readouterr().out
+
+        pressing(daemon)
+        if fault:
+            daemon.config.write_text(f"{config}max_speed_m_per_s = 1e-6\n")
+        assert daemon.ask("reload" if fault else "disarm") == ""
+        subscriber.until("hapticd/status", armed=False, releasing=True, latched=fault)
+        assert said().startswith("default: " + ("stopped by a fault, releasing, law" if fault else "releasing, law"))
+        subscriber.until("hapticd/status", armed=False, releasing=False, latched=fault)
+        assert said().startswith("default: " + ("stopped by a fault, law" if fault else "disarmed, law"))
 
 
 def test_without_a_daemon_it_says_how_to_start_one(tmp_path: Path) -> None:

@@ -58,6 +58,12 @@ def test_whatever_is_known_the_picture_has_the_size_of_the_terminal(
     assert [line.cell_len for line in lines] == [width] * height
 
 
+def test_a_fault_whose_force_is_still_being_ramped_out_says_so() -> None:
+    known = ScreenState()
+    known.take([Status(latched=True, releasing=True)], 0.0)
+    assert " LATCHED, RELEASING " in frame(known, "ipc:///x", 80, 24, 0.0)[0].plain
+
+
 def test_a_latched_fault_says_how_to_go_on() -> None:
     known = ScreenState()
     known.take([Status(latched=True, law="tdpa", rate_hz=1000.0)], 0.0)

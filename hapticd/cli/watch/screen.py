@@ -135,7 +135,7 @@ def _header(status: Status, known: ScreenState, width: int, now_s: float) -> Tex
 
 def _state(status: Status) -> tuple[str, str]:
     if status.latched:
-        return "LATCHED", "bold white on red"
+        return "LATCHED, RELEASING" if status.releasing else "LATCHED", "bold white on red"
     if status.device_lost_timestamp:
         return "NO DEVICE", "bold white on red"
     if status.fallback:

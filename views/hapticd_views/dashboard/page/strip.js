@@ -46,7 +46,7 @@ function state(link, trouble, status) {
   if (!link) return ["No link", "warn"];
   if (trouble || !status) return ["No daemon", "warn"];
   if (status.device_lost_timestamp) return ["Device lost", "fault"];
-  if (status.latched) return ["Fault", "fault"];
+  if (status.latched) return [status.releasing ? "Fault, releasing" : "Fault", "fault"];
   if (status.fallback) return ["Fallback", "warn"];
   if (status.releasing) return ["Releasing", "warn"];
   return status.armed ? ["Armed", "armed"] : ["Disarmed", "idle"];
