@@ -6,10 +6,14 @@ import contextlib
 import importlib
 import inspect
 import signal
+import sys
 import threading
+import zlib
 from collections.abc import Iterator
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from types import FrameType, ModuleType
+from pathlib import Path
+from types import FrameType, FunctionType, ModuleType
 from typing import Any, NoReturn
 
 from hapticd.driver import Driver
@@ -59,7 +63,35 @@ def law(name: str) -> ModuleType:
     if not isinstance(loaded, ModuleType):
         raise PluginError(f"law {name}: {loaded!r} is not a module")
     check_law(loaded)
+    code_of(loaded)
     return loaded
+
+
+@cache
+def code_of(law: ModuleType) -> int:
+    """A number that another code of a law differs in; it is of what is imported, not of what was edited since.
+
+    It is taken when this is called first, as `law` does at the import: of the law's file, and of those of its package
+    from which it has modules, classes or functions.
+    """
+    package = law.__name__.partition(".")[0]
+    found, waiting = {law.__name__: law}, [law]
+    while waiting:
+        for each in tuple(vars(waiting.pop()).values()):
+            name = ""
+            if isinstance(each, ModuleType):
+                name = each.__name__
+            elif isinstance(each, type | FunctionType):  # of anything else nobody knows what a look at it does
+                name = str(each.__module__)
+            module = sys.modules.get(name)
+            if name.partition(".")[0] == package and name not in found and isinstance(module, ModuleType):
+                found[name] = module
+                waiting.append(module)
+    code = 0
+    for name in sorted(found):
+        with contextlib.suppress(OSError, ValueError):  # a package needs no file
+            code = zlib.crc32(Path(getattr(found[name], "__file__", None) or "").read_bytes(), code)
+    return code
 
 
 def _unknown(group: str, kind: str, name: str, own: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import signal
 import sys
 from importlib.metadata import EntryPoint, EntryPoints
@@ -50,6 +51,40 @@ def installed(monkeypatch: pytest.MonkeyPatch, **points: str) -> None:
         for group in (plugins.DRIVERS, plugins.CONTROLLERS)
     ]
     monkeypatch.setattr(plugins, "entry_points", lambda **which: EntryPoints(found).select(**which))
+
+
+@pytest.mark.parametrize(
+    ("line", "edited", "differs"),
+    [
+        ("from lab.spring import pull", "law", True),
+        ("from lab.spring import pull", "spring", True),
+        ("from lab.spring import Spring", "spring", True),
+        ("import lab.spring", "spring", True),
+        ("from lab.through import pull", "spring", True),
+        ("from lab.spring import pull", "other", False),
+    ],
+)
+def test_the_code_of_a_law_is_that_of_its_file_and_of_what_it_uses_of_its_package(
+    elsewhere: Path, line: str, edited: str, differs: bool
+) -> None:
+    def fresh() -> int:
+        for name in [name for name in sys.modules if name == "lab" or name.startswith("lab.")]:
+            del sys.modules[name]
+        importlib.invalidate_caches()
+        return plugins.code_of(plugins.law("lab.law"))
+
+    spring = "class Spring: pass\ndef pull(): return 1.0\n"
+    files = {"spring": spring, "through": "from lab.spring import pull\n", "other": "\n"}
+    for name, text in (files | {"law": f"{line}\n{GOOD_LAW}"}).items():
+        (elsewhere / f"{name}.py").write_text(text)
+    code = fresh()
+    assert fresh() == code
+    law = sys.modules["lab.law"]
+    (elsewhere / f"{edited}.py").write_text((elsewhere / f"{edited}.py").read_text() + "# edited\n")
+    assert plugins.code_of(law) == code, "as it was imported"
+    assert (fresh() != code) is differs
+    for name in [name for name in sys.modules if name == "lab" or name.startswith("lab.")]:
+        del sys.modules[name]
 
 
 def test_what_the_distribution_ships_is_found_by_name() -> None:

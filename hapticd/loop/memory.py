@@ -52,7 +52,10 @@ HISTORY_S = 8.0
     LATCHED,
     REMOTE,  # updates that clients sent for what they may drive
     PORTS,  # which list of those things the loop has: `hapticd.loop.remote_slots`
-) = range(16)
+    LAW_CODE,  # what the loop has loaded from files, which it leaves to the next one as well
+    PORT_LAW_CODE,
+    FIELDS,
+) = range(19)
 """Words, each written by one side only."""
 
 DISARMED_SINCE = "not done: disarming was asked for after it"

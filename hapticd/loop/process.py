@@ -29,8 +29,10 @@ from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import DEVICE_LOST, FORCE_LEFT, GO, SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.realtime import become_realtime, die_with_parent, leave_realtime, sleep_until
 from hapticd.loop.resume import ResumeState, identity
+from hapticd.loop.sources import edited, loaded
 from hapticd.loop.warm_up import warm_up
 from hapticd.tick.assemble import make_tick, place_device
+from hapticd.tick.event import EventCode
 from hapticd.tick.record import RecordLayout
 from hapticd.version import __version__
 
@@ -119,6 +121,7 @@ def _prepare(asked: _Asked, channel: socket.socket, parent_pid: int) -> ControlL
         layout = RecordLayout(len(info.axes), info.has_orientation, MAX_WALLS)
         shared = SharedMemory(layout, settings.loop.rate_hz)
         tick = make_tick(config, info)
+        before, resume = resume, loaded(resume, config)
         control = ControlLoop(
             driver,
             tick,
@@ -129,6 +132,9 @@ def _prepare(asked: _Asked, channel: socket.socket, parent_pid: int) -> ControlL
             sleep_until,
             resume,
         )
+        if names := ", ".join(edited(before, resume, config)):
+            text = f"stays disarmed: edited since it was loaded: {names}; `hapticd arm` for what it is now"
+            control.session.event(EventCode.DISARMED, text)
         for name, law in asked.laws.items():
             control.requests.know(name, law)
         control.requests.know(settings.controller.law, config.law)

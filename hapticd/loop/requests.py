@@ -19,13 +19,13 @@ from hapticd.config.safety import SafetyConfig
 from hapticd.config.walls import WallConfig
 from hapticd.driver import DriverState
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import DISARM, DISARMED_SINCE
+from hapticd.loop.memory import DISARM, DISARMED_SINCE, FIELDS, LAW_CODE
 from hapticd.loop.session import Session
 from hapticd.loop.worker import Worker
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Mode
-from hapticd.tick.space.solid import field_of
+from hapticd.tick.space.solid import field_of, fields_of
 
 _SWITCH_INTERVAL_S = 5e-5
 """How soon an import that runs beside the loop gives the interpreter back to it [s]."""
@@ -178,7 +178,10 @@ class RequestHandler:
         for each in objects:
             if isinstance(each, MeshObject):
                 yield from self._beside(partial(field_of, Path(each.file)))
+        fields = fields_of(objects)
         yield from tick.switch(new_scene, new_safety, None if keep_law else pattern.another)
+        session.shared.words[LAW_CODE] = plugins.code_of(module)
+        session.shared.words[FIELDS] = fields
         session.shared.layout.serve(tick)
         session.said.serve(tick.ports, session.deadline_ns)
         session.stall_ns = int(new_safety.supervisor_stall_s * 1e9)

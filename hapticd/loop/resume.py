@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from hapticd.device import DeviceInfo
-from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED, SharedMemory
+from hapticd.loop.memory import (
+    DISARM,
+    DISARMED,
+    FIELDS,
+    LATCHED,
+    LAW,
+    LAW_CODE,
+    MAY_ARM,
+    NEXT_SEQ,
+    PORT_LAW_CODE,
+    SKIPPED,
+    SharedMemory,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +31,9 @@ class ResumeState:
         may_arm: forces were let through when it ended; a device that arms by itself may do so again.
         latched: a fault that took the force away has not been cleared.
         device: `identity` of the device; no other one may take its place. "": any.
+        law_code: `plugins.code_of` its law; 0: any.
+        port_law_code: and of the law that couplings and forces are under.
+        fields: `fields_of` its scene; 0: any.
     """
 
     seq: int = 0
@@ -27,6 +42,9 @@ class ResumeState:
     may_arm: bool = True
     latched: bool = False
     device: str = ""
+    law_code: int = field(default=0, repr=False)
+    port_law_code: int = field(default=0, repr=False)
+    fields: int = field(default=0, repr=False)
 
 
 FROM_START = ResumeState()
@@ -48,6 +66,9 @@ def left_by(shared: SharedMemory, info: DeviceInfo) -> ResumeState:
         may_arm=bool(words[MAY_ARM]) and words[DISARM] == words[DISARMED],
         latched=bool(words[LATCHED]),
         device=identity(info),
+        law_code=words[LAW_CODE],
+        port_law_code=words[PORT_LAW_CODE],
+        fields=words[FIELDS],
     )
 
 

@@ -7,7 +7,19 @@ from typing import Any
 
 from hapticd.driver import Driver
 from hapticd.errors import DriverError
-from hapticd.loop.memory import DISARM, DISARMED, LATCHED, LAW, MAY_ARM, NEXT_SEQ, SKIPPED, SharedMemory
+from hapticd.loop.memory import (
+    DISARM,
+    DISARMED,
+    FIELDS,
+    LATCHED,
+    LAW,
+    LAW_CODE,
+    MAY_ARM,
+    NEXT_SEQ,
+    PORT_LAW_CODE,
+    SKIPPED,
+    SharedMemory,
+)
 from hapticd.loop.remote_slots import SlotReader
 from hapticd.loop.resume import ResumeState
 from hapticd.tick.event import EventCode, LoopEvent
@@ -58,6 +70,9 @@ class Session:
         words[LAW] = resume.law
         words[MAY_ARM] = resume.may_arm
         words[LATCHED] = resume.latched
+        words[LAW_CODE] = resume.law_code
+        words[PORT_LAW_CODE] = resume.port_law_code
+        words[FIELDS] = resume.fields
 
     def event(self, code: EventCode, text: str, **fields: float | int | str) -> None:
         """Tell the supervisor that something happened."""

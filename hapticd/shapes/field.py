@@ -9,7 +9,7 @@ import struct
 import sys
 import zlib
 from array import array
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite, sqrt
 from typing import Any
 
@@ -38,6 +38,7 @@ class Field:
         margin_m: from the surface to the edge of the grid, at least [m].
         error_m: largest error of the distance between the points, near the surface [m].
         distances_m: negative inside, z running fastest; float32 [m].
+        check: a number that the file of another field differs in; 0 for one that was not read from a file.
     """
 
     counts: tuple[int, int, int]
@@ -46,6 +47,7 @@ class Field:
     margin_m: float
     error_m: float
     distances_m: array[float]
+    check: int = field(default=0, compare=False)
 
     def pack(self) -> bytes:
         """The field as the content of a file."""
@@ -69,7 +71,8 @@ class Field:
         _, version, nx, ny, nz, *numbers, check = _HEADER.unpack_from(content)
         if version != _VERSION:
             raise ConfigError(f"is a distance field of version {version}; this hapticd reads version {_VERSION}")
-        if zlib.crc32(content[: _HEADER.size]) != _CHECK.unpack_from(content, _HEADER.size)[0]:
+        whole = zlib.crc32(content[: _HEADER.size])  # the check of the distances is in it
+        if whole != _CHECK.unpack_from(content, _HEADER.size)[0]:
             raise ConfigError("is damaged: its header is not what was written")
         body = content[start:]
         if len(body) != 4 * nx * ny * nz or zlib.crc32(body) != check:
@@ -79,7 +82,7 @@ class Field:
             raise ConfigError("is no possible distance field")
         distances_m = array("f")
         distances_m.frombytes(body)
-        return cls((nx, ny, nz), (ox, oy, oz), spacing_m, margin_m, error_m, _little(distances_m))
+        return cls((nx, ny, nz), (ox, oy, oz), spacing_m, margin_m, error_m, _little(distances_m), whole)
 
     @property
     def size_m(self) -> tuple[float, float, float]:

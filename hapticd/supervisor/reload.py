@@ -131,7 +131,9 @@ class Reload:
         if state.recovery.lost:
             if _meaning(wanted) != _meaning(state.config):
                 state.recovery.stop()  # a try that is under way has the file of before
-            resume = state.recovery.resume
+            resume = replace(state.recovery.resume, fields=0)  # a reload reads them anew
+            if state.config.config.controller.law != wanted.config.controller.law:
+                resume = replace(resume, law_code=0)
             other_law = not same_law(state.config, wanted)
             state.recovery.amend(replace(resume, law=resume.law + other_law))
             state.recovery.hurry()

@@ -21,11 +21,14 @@ from hapticd.loop.memory import (
     DEVICE_LOST,
     DISARM,
     DISARMED,
+    FIELDS,
     FORCE_LEFT,
     LATCHED,
     LAW,
+    LAW_CODE,
     MAY_ARM,
     NEXT_SEQ,
+    PORT_LAW_CODE,
     SKIPPED,
     SharedMemory,
 )
@@ -72,6 +75,7 @@ def looking(monkeypatch: pytest.MonkeyPatch) -> tuple[Recovery, list[UnderWay]]:
 
 
 LEFT = {NEXT_SEQ: 70, SKIPPED: 2, LAW: 1, MAY_ARM: True, LATCHED: True, DISARM: 0, DISARMED: 0}
+LEFT |= {LAW_CODE: 0, PORT_LAW_CODE: 0, FIELDS: 0}
 LOST: Any = SimpleNamespace(
     exit_code=0,
     left_behind="",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+import zlib
+from collections.abc import Generator, Iterable, Sequence
 from copy import copy
 from functools import lru_cache
 from math import inf
@@ -190,6 +191,16 @@ def field_of(file: Path) -> Field:
     except OSError as error:
         raise ConfigError(f"file = {file}: {error.strerror}; `hapticd mesh` makes it from an STL or OBJ file") from None
     return _field(file, seen.st_mtime_ns, seen.st_size)
+
+
+def fields_of(objects: Iterable[ObjectConfig]) -> int:
+    """A number that other fields of a scene's meshes differ in; of those that are loaded, not of what was edited since.
+
+    Raises:
+        ConfigError: a file cannot be read, or is none.
+    """
+    checks = [field_of(Path(each.file)).check for each in objects if isinstance(each, MeshObject)]
+    return zlib.crc32(repr(checks).encode()) if checks else 0
 
 
 @lru_cache(maxsize=64)
