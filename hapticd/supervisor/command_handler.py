@@ -89,7 +89,7 @@ class CommandHandler:
 
     def _settle(self) -> None:
         if self._state.loop.force_seen_to:
-            self._state.requests.settle(self._state.recovery.force_left)
+            self._state.requests.settle(self._state.release.force_left)
 
     def _status(self) -> dict[str, Any]:
         return self._state.publisher.completed(self._state.status.made.as_map())

@@ -1,4 +1,8 @@
-"""The daemon: what `hapticd run` does until it is to stop."""
+"""The daemon: what `hapticd run` does until it is to stop.
+
+Its turn and all ways to its end are in one module: the order in which a force is taken away, told of and answered for
+is what the others rely on.
+"""
 
 from __future__ import annotations
 
@@ -112,7 +116,8 @@ class Daemon:
                 config=config,
                 loop=loop,
                 requests=RequestQueue(loop.shared),
-                recovery=Recovery(self._rescue, lambda: self.release.force_left),
+                recovery=Recovery(self._rescue),
+                release=self.release,
                 publisher=publisher,
                 commands=commands,
                 remote=remote,
@@ -172,6 +177,8 @@ class Daemon:
         if why and not loop.force_seen_to:
             loop.force_seen_to = True
             log.error("%s; %s", why, self._take_force_away())
+            if self.release.force_left:
+                self.exit_code = 1
 
     def _rescue(self, why: str) -> None:
         """Take the force away from outside, and be ready to do so again: the daemon may go on."""
@@ -224,9 +231,9 @@ class Daemon:
             await asyncio.sleep(pause_s(state.publisher.flush_due_ns, time.monotonic_ns()))
         self._end_force(state.loop)  # one that lost its device may hang, and no record is to be waited for before
         state.recovery.stop()
-        self._handler.end(self._force_left())
+        self._handler.end(self.release.force_left)
         state.event_log.close(state.config, state.loop, RECORD_TIMEOUT_S)
-        self._handler.end(self._force_left())  # for who has asked while that took its time
+        self._handler.end(self.release.force_left)  # for who has asked while that took its time
         return self.exit_code
 
     def _turn(self) -> None:
@@ -367,6 +374,7 @@ class Daemon:
         while self._publish():
             pass
         state.event_log.recorder.loop_ended()
+        self.release.force_left = ""
         state.requests.abandon(event.text, None)  # the next turns look after its force
         state.recovery.begin(state.loop, event.text.removeprefix("device lost: "))
 
@@ -379,15 +387,6 @@ class Daemon:
         state.arm_hold.keep(state.loop)
         state.tell(EventCode.CONTROL_LOST, f"{text}; {outcome}")
         self.exit_code = 1
-
-    def _force_left(self) -> str:
-        """Why a force may be left as the daemon ends, a line for people; "" when there is none."""
-        state = self.state
-        if state.loop.force_seen_to:
-            return state.recovery.force_left if state.recovery.lost else self.release.force_left
-        if state.loop.exit_code is None:
-            return "the daemon has stopped with its loop still letting go; its log says what came of it"
-        return state.loop.left_behind and f"{state.loop.left_behind}; the daemon's log says what came of it"
 
     def _problems(self) -> list[str]:
         """What stands and should be known, each a line."""

@@ -57,7 +57,7 @@ class ForceRelease:
         config: names the device; what of it a reload may change is of no matter here.
 
     Attributes:
-        force_left: why the last release may have left a force, a line for people; "" when it did not.
+        force_left: why a force may be left since the last release, a line for people; "" when there is none.
     """
 
     def __init__(self, config: LoadedConfig) -> None:

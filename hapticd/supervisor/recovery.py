@@ -29,21 +29,17 @@ class Recovery:
     Args:
         rescue: called with why the force has to be taken away from outside, where a try did not end by itself, or the
             loop that lost the device did not let go of it.
-        left: why the last rescue may have left a force, a line for people; "" when it did not.
 
     Attributes:
         lost: the device is being looked for.
         lost_s: since when, on CLOCK_MONOTONIC [s].
         next_try_s: when the next try is due; of one under way, when it began [s].
         why: why the last try failed, or why the device was lost.
-        force_left: why the lost device may still have a force, once its loop's `force_seen_to`; "" when it has none.
         resume: what the next loop goes on from.
     """
 
-    def __init__(self, rescue: Callable[[str], None], left: Callable[[], str] = lambda: "") -> None:
-        self._take_away = rescue
-        self._left = left
-        self.force_left = ""
+    def __init__(self, rescue: Callable[[str], None]) -> None:
+        self._rescue = rescue
         self.lost = False
         self.lost_s = 0.0
         self.next_try_s = 0.0
@@ -66,7 +62,6 @@ class Recovery:
             self._wait_s = FIRST_S
         self.lost = True
         self.lost_s = now_s
-        self.force_left = ""
         self._arrivals = HotplugWatch()
         self.resume = left_by(lost.shared, lost.info)
         self._put_off(why)
@@ -135,10 +130,6 @@ class Recovery:
         lost.force_seen_to = True
         if why:
             self._rescue(why)
-
-    def _rescue(self, why: str) -> None:
-        self._take_away(why)
-        self.force_left = self._left()
 
     def _put_off(self, why: str) -> None:
         self.why = why

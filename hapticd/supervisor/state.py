@@ -11,6 +11,7 @@ from hapticd.supervisor.arm_hold import ArmHold
 from hapticd.supervisor.child import LoopProcess
 from hapticd.supervisor.commands import CommandSocket
 from hapticd.supervisor.events import EventLog
+from hapticd.supervisor.force_release import ForceRelease
 from hapticd.supervisor.recovery import Recovery
 from hapticd.supervisor.remote_process import RemoteProcess
 from hapticd.supervisor.request_queue import MOST_WAITING, Answer, RequestQueue
@@ -29,6 +30,7 @@ class DaemonState:
         loop: the process that has the device, or had it last.
         requests: what the loop is asked.
         recovery: looks for a device that is lost.
+        release: takes the force away from outside.
         publisher: telemetry.
         commands: the control socket.
         remote: the process that hears clients of the scene.
@@ -49,6 +51,7 @@ class DaemonState:
     loop: LoopProcess
     requests: RequestQueue
     recovery: Recovery
+    release: ForceRelease
     publisher: Publisher
     commands: CommandSocket
     remote: RemoteProcess

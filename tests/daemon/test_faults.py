@@ -268,6 +268,18 @@ def test_a_device_that_nobody_can_find_again_is_not_called_one_without_force() -
 
 
 @anew_where_late
+def test_who_stops_a_daemon_whose_lost_loop_hangs_hears_what_became_of_the_force() -> None:
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        rig.order("hang-disable")
+        events_until(subscriber, EventCode.DEVICE_LOST)
+        rig.order("swapped")  # for whoever opens it from now on
+        why = "the device could not be opened: found faulty 2 (x) instead of faulty 1 (x)"
+        assert rig.ask("stop") == {"ok": False, "text": f"the force may still be there: {why}"}
+        assert why in rig.daemon.output()
+        assert rig.daemon.wait_exit() == 1
+
+
+@anew_where_late
 def test_a_helper_that_was_killed_is_replaced_when_it_is_needed_and_outlives_nobody() -> None:
     with contextlib.ExitStack() as stack:
         first, second = (stack.enter_context(Rig()).pressed() for _ in range(2))

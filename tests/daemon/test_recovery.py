@@ -152,7 +152,7 @@ def test_who_disarms_a_device_that_is_lost_hears_once_it_is_known_what_became_of
     left: str,
 ) -> None:
     """It was answered with ok at once, with the loop still hanging in its driver and the force on the hand."""
-    made = Recovery(Mock(), lambda: left)
+    made = Recovery(Mock())
     made.begin(LOST, "silent")
     verdicts: list[str] = []
     asked = [({"do": "disarm"}, lambda _ok, verdict: verdicts.append(verdict), "a test")]
@@ -166,6 +166,7 @@ def test_who_disarms_a_device_that_is_lost_hears_once_it_is_known_what_became_of
         requests=RequestQueue(cast("SharedMemory", SimpleNamespace(words=defaultdict(int)))),
         commands=SimpleNamespace(receive=lambda: [asked.pop()] if asked else []),
         arm_hold=Mock(),
+        release=SimpleNamespace(force_left=left),
         tell=Mock(),
     )
     state.requests.disarm(verdicts.append)
