@@ -323,9 +323,7 @@ def test_a_fault_is_held_said_and_cleared(page: Page, daemon: Daemon) -> None:
     page.click("#span button:nth-child(1)")
     page.click("#trigger button:nth-child(4)")
     page.call("Emulation.setTimezoneOverride", timezoneId="Asia/Kolkata")
-    apply(page, "safety.ramp_s", "1.0")
     apply(page, "safety.max_speed_m_per_s", "0.001")
-    state(page, "Fault, releasing")
     state(page, "Fault")
     fault = page.evaluate("document.getElementById('fault').innerText")
     assert re.search(r"Over-speed at \d\d:\d\d:\d\d \+0530\.", fault)
@@ -347,6 +345,19 @@ def test_a_fault_is_held_said_and_cleared(page: Page, daemon: Daemon) -> None:
     assert page.evaluate("document.getElementById('fault').hidden")
     page.click("#arm")
     state(page, "Armed")
+
+
+def test_a_force_that_is_ramped_out_after_a_fault_is_said(browser: Browser) -> None:
+    with (
+        Daemon(CONFIG) as daemon,
+        Served(daemon.wait_ready().directory / "run") as served,
+        browser.page(served.command) as page,
+    ):
+        state(page, "Armed")
+        daemon.config.write_text(CONFIG + "[safety]\nramp_s = 1.0\nmax_speed_m_per_s = 0.001\n")
+        assert daemon.ask("reload") == ""
+        state(page, "Fault, releasing")
+        state(page, "Fault")
 
 
 def test_a_daemon_that_has_gone_is_said(browser: Browser, served: Served, daemon: Daemon) -> None:
