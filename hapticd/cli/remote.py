@@ -18,6 +18,7 @@ from hapticd.client import commands
 from hapticd.client.commands import RefusedError, command
 from hapticd.errors import InstanceError
 from hapticd.paths import CONTROL, DEFAULT_INSTANCE, alive, locate
+from hapticd.telemetry.records import Status
 
 _ENDED_S = 15.0  # a ramp, and a driver that takes its time to let go of a device
 _CALL_OFF = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -140,7 +141,10 @@ def calibrate(
     Example: hapticd calibrate --countdown 10
     """
     # First: is there a daemon, and will it? A countdown says that the arm will move.
-    if command("status", instance, connect=connect, keys=keys)["status"]["armed"]:
+    status = Status.of(command("status", instance, connect=connect, keys=keys)["status"])
+    if status.device_lost_timestamp:
+        raise RefusedError("there is no device to calibrate: it was lost, and is being looked for")
+    if status.armed:
         raise RefusedError("calibration moves the arm by itself: `hapticd disarm` first")
     for number in _CALL_OFF:
         if signal.getsignal(number) is not signal.SIG_IGN:  # nohup wants it to go on

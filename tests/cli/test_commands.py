@@ -197,10 +197,17 @@ def test_nobody_clears_a_workspace_for_a_daemon_that_is_not_there(tmp_path: Path
     assert done.stderr.startswith("hapticd: no daemon answers on ")
 
 
-def test_nor_for_one_that_is_armed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("said", "why"), [({"armed": True}, "`hapticd disarm` first"), ({"device_lost_timestamp": 1.7e9}, "no device")]
+)
+def test_nor_for_one_that_is_armed_or_has_no_device(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], said: dict[str, object], why: str
+) -> None:
     """It counted down to an arm that would move by itself, and was then refused."""
-    monkeypatch.setattr(remote, "command", lambda *_, **__: {"status": {"armed": True}})
-    with pytest.raises(RefusedError, match="`hapticd disarm` first"):
+    monkeypatch.setattr(remote, "command", lambda *_, **__: {"status": said})
+    monkeypatch.setattr("hapticd.client.commands.calibrate", lambda *_: pytest.fail("it calibrates"))
+    monkeypatch.setattr("hapticd.cli.remote.signal.signal", lambda *_: None)
+    with pytest.raises(RefusedError, match=why):
         remote.calibrate(countdown_s=1)
     assert capsys.readouterr().err == ""
 
