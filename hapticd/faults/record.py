@@ -11,7 +11,7 @@ import json
 import math
 import platform
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,14 @@ from hapticd.config.loading import LoadedConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import HapticdError
 from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.flags import Flag
 from hapticd.tick.record import RecordLayout, TickRecord
 from hapticd.version import __version__
 
 MAGIC = b"hapticd fault record 1\n"
 SUFFIX = ".fault"
 
+_FORCES = Flag.ARMED | Flag.RELEASING
 _LARGEST_HEADER = 1 << 24
 _KEYS = {"event", "instance", "version", "device", "driver", "config", "law", "ticks"}
 _EVENT_KEYS = {"code", "name", "text", "seq", "deadline_ns", "timestamp"}
@@ -186,7 +188,8 @@ class FaultSummary:
         after_s: how far it goes on after it [s].
         force_before_n: magnitude of the force in the last tick before the fault [N].
         peak_force_n: largest magnitude from the fault on [N].
-        ramp_ticks: ticks with a force from the fault on; None when the record ends before the force does.
+        ramp_ticks: ticks from the fault up to the last one with a force; None when the record ends before the device
+            is disarmed.
         skipped: deadlines skipped within the record.
     """
 
@@ -205,13 +208,23 @@ def summarise(record: FaultRecord) -> FaultSummary:
     at = int(record.header["event"]["seq"])
     forces = [(tick.seq, math.hypot(*tick.force_n)) for tick in ticks]
     after = [force for seq, force in forces if seq >= at]
-    gone = next((index for index, force in enumerate(after) if force == 0.0), None)
     return FaultSummary(
         ticks=len(ticks),
         before_s=max(0.0, (record.fault_ns - ticks[0].deadline_ns) * 1e-9) if ticks else 0.0,
         after_s=max(0.0, (ticks[-1].deadline_ns - record.fault_ns) * 1e-9) if ticks else 0.0,
         force_before_n=next((force for seq, force in reversed(forces) if seq < at), 0.0),
         peak_force_n=max(after, default=0.0),
-        ramp_ticks=gone,
+        ramp_ticks=_ramp_ticks([tick for tick in ticks if tick.seq >= at]),
         skipped=ticks[-1].skipped - ticks[0].skipped if ticks else 0,
     )
+
+
+def _ramp_ticks(after: Sequence[TickRecord]) -> int | None:
+    """A handle that is out of the wall for a moment has no force either, so the release is over where it is disarmed.
+
+    Somebody may arm it again within the record: that force is another one.
+    """
+    disarmed = next((index for index, tick in enumerate(after) if not tick.flags & _FORCES), None)
+    if disarmed is None:
+        return None
+    return max((index + 1 for index, tick in enumerate(after[: disarmed + 1]) if any(tick.force_n)), default=0)

@@ -10,6 +10,7 @@ import os
 import stat
 import threading
 import time
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from hapticd.loop.memory import RECORDS, SharedMemory
 from hapticd.paths import fault_directories, fault_directory
 from hapticd.supervisor.fault_recorder import FaultRecorder
 from hapticd.tick.event import EventCode, LoopEvent
+from hapticd.tick.flags import Flag
 from hapticd.tick.record import RecordLayout
 from hapticd.trace import DriverTrace
 from tests.daemon.running import wait_until
@@ -34,11 +36,12 @@ from tests.daemon.test_flood import descriptors
 
 RATE_HZ = 1000.0
 LAYOUT = RecordLayout(2, True, 8)
+OUT = int(Flag.RELEASING | Flag.LATCHED)
 EVENT = LoopEvent(EventCode.OVER_SPEED, "3 m/s is above the limit", 20, 20_000_000, {"speed": 3.0})
 
 
-def row(seq: int, force_n: float, walls: int = 1) -> bytes:
-    head = (seq, seq * 1_000_000, 5.0, 60.0, 1e-3, 0, 1, 0, 3, 0.02, 0.1, 0.2, 0.3, 0.4, walls)
+def row(seq: int, force_n: float, walls: int = 1, flags: int = Flag.ARMED) -> bytes:
+    head = (seq, seq * 1_000_000, 5.0, 60.0, 1e-3, 0, flags, 0, 3, 0.02, 0.1, 0.2, 0.3, 0.4, walls)
     axes = (0.001 * seq, 0.0, 0.1, 0.0, force_n, 0.0, force_n, 0.0, *range(9))
     packed = LAYOUT.struct(walls).pack(*head, *axes, *((1, 12e3, 9.5, 0.25, 2, 0.1, 0.01, 9.0, 0.4) * walls))
     return packed.ljust(LAYOUT.size, b"\xff")  # what lies behind the last wall is anything
@@ -53,9 +56,11 @@ def header() -> dict[str, Any]:
     return receipt(EVENT, 1e9, "left", parse("[loop]\nrate_hz = 1000.0\n", "lab.toml"), device())
 
 
-def content() -> bytes:
-    forces = [2.0] * 20 + [3.0, 1.0, 0.0, 0.0]
-    return encode(header(), LAYOUT, iter([b"".join(row(seq, force) for seq, force in enumerate(forces))]))
+def content(after: Sequence[tuple[float, int]] = ((3.0, OUT), (1.0, OUT), (0.0, 0), (0.0, 0))) -> bytes:
+    """A record of 20 ticks with a force, and these forces and flags from the fault on."""
+    ticks = [(2.0, int(Flag.ARMED))] * 20 + list(after)
+    rows = b"".join(row(seq, force_n, flags=flags) for seq, (force_n, flags) in enumerate(ticks))
+    return encode(header(), LAYOUT, iter([rows]))
 
 
 @pytest.fixture
@@ -78,11 +83,29 @@ def test_a_record_says_what_happened_to_what_under_which_configuration(path: Pat
 
 def test_ticks_come_back_as_they_were(path: Path) -> None:
     record = read(path)
-    assert record.ticks == [LAYOUT.unpack(row(tick.seq, tick.force_n[0])) for tick in record.ticks]
+    assert record.ticks == [LAYOUT.unpack(row(tick.seq, tick.force_n[0], flags=tick.flags)) for tick in record.ticks]
     figures = summarise(record)
     assert (figures.ticks, figures.force_before_n, figures.peak_force_n, figures.ramp_ticks) == (24, 2.0, 3.0, 2)
     assert figures.before_s == pytest.approx(0.02)
     assert figures.after_s == pytest.approx(0.003)
+
+
+@pytest.mark.parametrize(
+    ("after", "gone"),
+    [
+        pytest.param([(3.0, OUT), (0.0, OUT), (0.0, OUT), (1.0, OUT), (0.0, 0)], 4, id="bounced out of the wall"),
+        pytest.param([(3.0, OUT), (0.0, OUT)], None, id="out of the wall and still releasing"),
+        pytest.param([(3.0, OUT), (1.0, OUT)], None, id="a force to the end"),
+        pytest.param([(3.0, Flag.ARMED), (1.0, OUT), (0.0, 0), (2.0, Flag.ARMED)], 2, id="armed again"),
+        pytest.param([(0.0, OUT), (0.0, 0)], 0, id="no force at all"),
+    ],
+)
+def test_the_force_of_a_fault_is_gone_with_the_last_tick_that_has_one(
+    tmp_path: Path, after: list[tuple[float, int]], gone: int | None
+) -> None:
+    file = tmp_path / "x.fault"
+    file.write_bytes(content(after))
+    assert summarise(read(file)).ramp_ticks == gone
 
 
 def test_a_csv_has_every_field_of_every_tick_and_wall(tmp_path: Path) -> None:
