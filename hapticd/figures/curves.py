@@ -27,9 +27,11 @@ class Curves:
     Attributes:
         name: what the run is called in a legend.
         columns: by name, as `Run.columns` has them, all of one length; t_s, x_m and force_n at least, t_s rising.
-            Known besides: x_measured_m, force_requested_n, energy_j, cycle, damping_n_s_per_m, in_contact, late_us.
+            Known besides: x_measured_m, force_requested_n, energy_j, cycle, damping_n_s_per_m, in_contact, late_us,
+            armed, whether forces were let through.
         stiffness_n_per_m: of the wall, as commanded; NaN where it is not known [N/m].
         rest_m: where the device should rest; NaN where it is not known [m].
+        faults_s: when a fault took the force away [s].
 
     Raises:
         HapticdError: a column is missing, of another length or not finite, there is no tick, or times do not rise.
@@ -39,6 +41,7 @@ class Curves:
     columns: Mapping[str, Sequence[Any] | npt.NDArray[Any]]
     stiffness_n_per_m: float = float("nan")
     rest_m: float = float("nan")
+    faults_s: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         missing = [name for name in ("t_s", "x_m", "force_n") if name not in self.columns]
@@ -73,6 +76,11 @@ class Curves:
     def inside(self) -> npt.NDArray[np.bool_]:
         """Whether the device is inside the wall, tick by tick."""
         return self["in_contact"] != 0.0 if "in_contact" in self else self["x_m"] < 0.0
+
+    @property
+    def held(self) -> npt.NDArray[np.bool_]:
+        """Whether the wall had the device: inside it, with forces let through."""
+        return self.inside & (self["armed"] != 0.0) if "armed" in self else self.inside
 
     def line(self, column: str, factor: float = 1.0) -> tuple[Array, Array]:
         """Times and values of a column, to be drawn as a line.

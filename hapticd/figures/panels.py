@@ -136,8 +136,8 @@ def lateness(axes: Axes, runs: Sequence[Curves]) -> None:
 
 
 def displayed_stiffness_n_per_m(run: Curves, over_s: float) -> Array:
-    """Force over depth tick by tick, both means over a time in contact; NaN out of it [N/m]."""
-    inside = run.inside & (run["x_m"] < 0.0)
+    """Force over depth tick by tick, both means over a time at the wall; NaN off it and without force [N/m]."""
+    inside = run.held & (run["x_m"] < 0.0)
     kernel = np.ones(min(len(inside), max(1, round(over_s / run.period_s))))
     count = len(inside)
     force_n = np.convolve(np.where(inside, run["force_n"], 0.0), kernel)[:count]

@@ -168,6 +168,121 @@ def test_a_fault_is_named_with_its_time(tmp_path: Path, still: Run) -> None:
     assert answer(statements(recorded(tmp_path, still)), "Was there a fault").text == "None."
 
 
+def test_a_fault_that_only_the_statuses_tell_of_is_named_as_well(tmp_path: Path, still: Run) -> None:
+    fault: dict[str, Any] = {"fault_code": 202, "fault_text": "over-speed: 3 m/s", "latched": True}
+    within = Status(timestamp=EPOCH_S + 1.5, seq=1500, fault_timestamp=EPOCH_S + 1.25, **fault)
+    told = answer(statements(recorded(tmp_path, still, more=[within])), "Was there a fault")
+    assert (told.mark, told.text) == ("bad", "One at 1.25 s: over-speed: 3 m/s (code 202).")
+    before = Status(timestamp=EPOCH_S + 0.5, seq=500, fault_timestamp=EPOCH_S - 9.0, **fault)
+    told = answer(statements(recorded(tmp_path, still, more=[before])), "Was there a fault")
+    assert told.mark == "bad"
+    assert told.text == "None, but it was stopped by one from before, at 0.50 s: over-speed: 3 m/s (code 202)."
+    cleared = replace(before, latched=False, armed=True)
+    assert answer(statements(recorded(tmp_path, still, more=[cleared])), "Was there a fault").mark == "good"
+
+
+# -- a wall without force
+
+
+TRIPPED = """
+[device.options]
+model = "omega7"
+initial_position_m = 0.0005
+[device.options.hand]
+force = { profile = "ramp", from_newton = 0.3, newton = -3.0, at_s = 1.0, duration_s = 0.4 }
+stiffness_n_per_m = 600.0
+damping_n_s_per_m = 3.0
+[[scene.walls]]
+stiffness_n_per_m = 30000.0
+[controller]
+law = "none"
+[safety]
+max_speed_m_per_s = 0.06
+"""
+
+
+@pytest.fixture(scope="module")
+def tripped() -> Run:
+    """So unstable that the first touch is a fault; then the handle rests inside the wall, without force."""
+    run = hapticd.simulate(hapticd.load(TRIPPED), 6.0)
+    assert run.outcome is Outcome.STOPPED
+    return run
+
+
+def fault_of(run: Run) -> Event:
+    assert run.fault is not None
+    at_s = float(run.fault.split()[0])
+    return Event(EPOCH_S + at_s, round(at_s * 1e3), 202, "over-speed", {})
+
+
+def test_a_wall_that_trips_the_speed_limit_is_not_stable_for_the_rest_after_it(tmp_path: Path, tripped: Run) -> None:
+    fault = fault_of(tripped)
+    told = statements(open_source(write_recording(tmp_path / "trip.mcap", tripped, TRIPPED, more=[fault])))
+    stable = answer(told, "Was it stable")
+    assert stable.mark == "bad"
+    assert stable.text.startswith(f"Stopped: a fault ended a touch of the wall at {fault.timestamp - EPOCH_S:.2f} s")
+    assert "s inside the wall without force are not judged." in stable.text
+    assert (stable.numbers["held_s"], stable.numbers["faulted"]) == (0.0, 1)
+    shown = answer(told, "What did the law").numbers["displayed_stiffness_n_per_m"]
+    assert shown == pytest.approx(30e3, rel=0.1), "the rest shows 0"
+
+
+@pytest.mark.parametrize("suffix", ["csv", "npz"])
+def test_the_same_run_in_a_file_of_simulate_is_judged_up_to_where_it_stopped(
+    tmp_path: Path, tripped: Run, suffix: str
+) -> None:
+    path = tmp_path / f"trip.{suffix}"
+    if suffix == "npz":
+        np.savez(path, allow_pickle=False, **{name: np.asarray(column) for name, column in tripped.columns.items()})
+    else:
+        table = np.column_stack([np.asarray(column, float) for column in tripped.columns.values()])
+        np.savetxt(path, table, delimiter=",", header=",".join(tripped.columns), comments="")
+    told = statements(open_source(path))
+    assert answer(told, "Was it stable").mark == "bad"
+    assert answer(told, "What did the law").numbers["displayed_stiffness_n_per_m"] == pytest.approx(30e3, rel=0.1)
+
+
+def test_a_daemon_that_was_stopped_all_the_time_says_nothing_of_its_wall(tmp_path: Path, tripped: Run) -> None:
+    latched = Status(
+        timestamp=EPOCH_S, seq=0, latched=True, fault_code=202, fault_text="over-speed", fault_timestamp=EPOCH_S - 60.0
+    )
+    source = open_source(write_recording(tmp_path / "trip.mcap", tripped, TRIPPED, more=[latched]))
+    told = statements(source)
+    assert [one.mark for one in told[:3]] == ["unknown", "unknown", "bad"]
+    assert answer(told, "Was it stable").text.startswith("Not judged")
+    assert answer(told, "What did the law").text == "No force was let through at the wall."
+
+
+def test_a_touch_that_was_still_when_a_fault_came_is_neither_stable_nor_unstable(tmp_path: Path, still: Run) -> None:
+    told = statements(recorded(tmp_path, still, more=[Event(EPOCH_S + 2.5, 2500, 204, "lost", {})]))
+    stable = answer(told, "Was it stable")
+    assert stable.mark == "unknown"
+    assert stable.text.startswith("A fault ended a touch of the wall at 2.50 s. Held: ")
+
+
+def test_what_is_disarmed_on_request_is_stable_for_as_long_as_it_was_armed(tmp_path: Path, still: Run) -> None:
+    """Armed again the handle arrives anew, so that half a second more is not judged."""
+    events = [
+        Event(EPOCH_S, 0, 100, "the loop runs", {}),
+        Event(EPOCH_S, 0, 101, "armed", {}),
+        Event(EPOCH_S + 1.7, 1700, 102, "disarmed", {}),
+        Event(EPOCH_S + 1.9, 1900, 101, "armed", {}),
+    ]
+    whole = answer(statements(recorded(tmp_path, still)), "Was it stable")
+    source = recorded(tmp_path, still, more=events)
+    assert source.recording is not None
+    armed = source.recording.armed
+    assert np.flatnonzero(np.diff(armed)).tolist() == [1700, 1900]
+    assert armed[0]
+    stable = answer(statements(source), "Was it stable")
+    assert (whole.mark, stable.mark) == ("good", "good")
+    assert stable.numbers["forceless_s"] == pytest.approx(0.2, rel=1e-3)
+    held_s, whole_s = stable.numbers["held_s"], whole.numbers["held_s"]
+    assert held_s is not None
+    assert whole_s is not None
+    assert 0.0 < held_s <= whole_s - 0.7
+
+
 def test_what_happened_is_told_in_order_of_time(tmp_path: Path, still: Run) -> None:
     more = [
         Note(EPOCH_S + 2.0, "recording stopped"),

@@ -67,7 +67,13 @@ def open_source(path: Path) -> Source:
     if "t_s" not in found and "timestamp" in found:
         raise HapticdError(f"{path}: is a table of `hapticd record export`; {_WANTED}")
     columns = {name: column for name, column in found.items() if name in Row._fields}
-    return Source(written(path), (Curves(written(path), columns),), None)
+    whole = Curves(written(path), columns)
+    stop = _stop(whole)
+    if stop is None:
+        return Source(whole.name, (whole,), None)
+    armed = np.arange(len(whole["t_s"])) < stop
+    stopped = replace(whole, columns={**columns, "armed": armed}, faults_s=(float(whole["t_s"][stop]),))
+    return Source(whole.name, (stopped,), None)
 
 
 def written(path: Path) -> str:
@@ -111,11 +117,13 @@ def recorded(name: str, recording: Recording) -> Source:
         columns["cycle"] = np.searchsorted(ended, ticks["timestamp"], side="right")
     if "damping_n_s_per_m" in columns:
         columns["damping_n_s_per_m"] = np.nan_to_num(columns["damping_n_s_per_m"])  # of a wall that a reload took away
+    columns["armed"] = recording.armed
     there = np.isfinite(columns["x_m"])  # the wall, which may have come or gone with a reload
     columns = {key: column[there] for key, column in columns.items()}
     commanded = stiffness.pop() if len(stiffness) == 1 else math.nan
     rest_m = _rest_m(recording, receipts[0]) if len(receipts) == 1 else math.nan
-    return Source(name, (Curves(name, columns, commanded, rest_m),), recording)
+    faults_s = tuple(fault.timestamp - float(ticks["timestamp"][0]) for fault in recording.faults)
+    return Source(name, (Curves(name, columns, commanded, rest_m, faults_s),), recording)
 
 
 def listen(daemon: DaemonClient, duration_s: float, stopped: Callable[[], bool]) -> Source:
@@ -152,6 +160,17 @@ def _axes(name: str, recording: Recording) -> tuple[Curves, ...]:
         )
         for at, axis in enumerate(recording.receipt["axes"])
     )
+
+
+def _stop(run: Curves) -> int | None:
+    """The first tick of a simulated run without any force, where a fault stopped it; None where none is seen to have.
+
+    Nothing else disarms such a run, and once it is, walls ask for a force and none comes.
+    """
+    if "force_requested_n" not in run:
+        return None
+    stop = int(np.max(np.flatnonzero(run["force_n"]), initial=-1)) + 1
+    return stop if run["force_requested_n"][stop:].any() else None
 
 
 def _rest_m(recording: Recording, receipt: dict[str, Any]) -> float:

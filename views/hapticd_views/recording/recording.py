@@ -19,6 +19,7 @@ from hapticd.telemetry.records import Cycle, Event
 from hapticd.tick.event import EventCode
 from hapticd_views.recording.columns import Values
 from hapticd_views.recording.fit import widened
+from hapticd_views.recording.loop import FAULTS, armed, loop_numbers
 from hapticd_views.recording.messages import Note, RecordedGap
 
 PER_TICK = ("position", "energy", "damping", "timing")
@@ -144,9 +145,34 @@ class Recording:
         return np.asarray(np.searchsorted(since, self.ticks["timestamp"], side="right"), np.int64)
 
     @cached_property
+    def loops(self) -> npt.NDArray[np.int64]:
+        """Which loop each of `ticks` is of: a restart begins another one, and so does a lost device that is found."""
+        return loop_numbers(self.ticks, self.topics)
+
+    @cached_property
+    def armed(self) -> npt.NDArray[np.bool_]:
+        """Whether forces were let through in each of `ticks`."""
+        return armed(self.ticks, self.topics)
+
+    @cached_property
     def events(self) -> tuple[Event, ...]:
         """What happened."""
         return tuple(_records(Event, self.topics.get("event", {})))
+
+    @cached_property
+    def faults(self) -> tuple[Event, ...]:
+        """The faults in it: those of its events, and those that a status tells of and no event."""
+        found = [event for event in self.events if event.code in FAULTS]
+        told = {event.timestamp for event in found}
+        status = self.topics.get("status", {})
+        if "fault_timestamp" in status and self.ticks:
+            first_s = float(self.ticks["timestamp"][0])
+            rows = zip(*(status[name] for name in ("fault_timestamp", "fault_code", "fault_text", "seq")), strict=True)
+            for at_s, code, text, seq in rows:
+                if at_s >= first_s and at_s not in told:
+                    told.add(at_s)
+                    found.append(Event(float(at_s), int(seq), int(code), str(text), {}))
+        return tuple(sorted(found, key=lambda event: event.timestamp))
 
     @property
     def markers(self) -> tuple[Event, ...]:

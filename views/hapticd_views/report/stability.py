@@ -47,6 +47,10 @@ class Stability:
         limit_m: largest span that is still [m].
         step_m: of the positions; 0 where they have none [m].
         felt: the felt index of the worst second that was still, 1 is just felt; NaN where there was none.
+        forceless_s: time inside the wall without force, which is not judged [s].
+        faulted: touches that a fault ended.
+        faulted_moving: of these, the ones that were not still when it came.
+        fault_s: when the first of them ended, since the first tick; NaN where none did [s].
     """
 
     held_s: float
@@ -58,6 +62,10 @@ class Stability:
     limit_m: float
     step_m: float
     felt: float
+    forceless_s: float
+    faulted: int
+    faulted_moving: int
+    fault_s: float
 
     @property
     def judged(self) -> bool:
@@ -65,24 +73,45 @@ class Stability:
         return self.held_s > 0.0
 
     @property
+    def unstable(self) -> bool:
+        """Whether it shook, or a fault came before it was still."""
+        return self.shaking_s > 0.0 or self.faulted_moving > 0
+
+    @property
     def stable(self) -> bool:
-        """Whether it was still all the time."""
-        return self.judged and self.shaking_s == 0.0
+        """Whether it was still all the time, as long as anybody wanted."""
+        return self.judged and not self.unstable and not self.faulted
 
     @property
     def words(self) -> str:
         """For people."""
+        told = [self._fault_words(), self._touch_words(), self._forceless_words()]
+        return " ".join(text for text in told if text)
+
+    def _fault_words(self) -> str:
+        if not self.faulted:
+            return ""
+        first = "a touch" if self.faulted == 1 else f"{self.faulted} touches, the first"
+        when = f"A fault ended {first} of the wall at {self.fault_s:.2f} s"
+        return f"Stopped: {when[0].lower()}{when[1:]}, before it was still." if self.faulted_moving else f"{when}."
+
+    def _forceless_words(self) -> str:
+        if self.forceless_s < BOUNCE_S:
+            return ""
+        return f"{self.forceless_s:.3g} s inside the wall without force are not judged."
+
+    def _touch_words(self) -> str:
         if not self.judged:
             least_s = ARRIVAL_S + Criterion().window_s
             return f"Not judged: it never stayed at the wall for {least_s:g} s at a stretch."
         limit = f"{self.limit_m * 1e3:.2g} mm, which is the limit"
-        if not self.stable:
+        if self.shaking_s > 0.0:
             share = 100.0 * self.shaking_s / self.held_s
             return (
                 f"Unstable: for {share:.0f} % of {self.held_s:.3g} s at the wall it shook by more than {limit}; worst "
                 f"by {self.worst_m * 1e3:.3g} mm at about {self.worst_hz:.0f} Hz, at {self.worst_s:.2f} s."
             )
-        told = f"Stable: {self.held_s:.3g} s at the wall"
+        told = f"{'Held' if self.faulted else 'Stable'}: {self.held_s:.3g} s at the wall"
         if self.ringing_s > ARRIVAL_S:
             told += f", still within {self.ringing_s:.3g} s of each arrival, and then"
         return f"{told} without shaking by more than {limit}. {self._felt_words()}".rstrip()
@@ -106,7 +135,13 @@ def judge(curves: Curves) -> Stability:
     step_m = _step_m(curves["x_m"])
     sensor_m = _step_m(curves["x_measured_m"]) if "x_measured_m" in curves else step_m
     limit_m = max(criterion.still_m, criterion.still_counts * sensor_m)
-    touches = [_Touch(curves, touch, max(2, round(criterion.window_s / curves.period_s))) for touch in _touches(curves)]
+    spans = _touches(curves)
+    window = max(2, round(criterion.window_s / curves.period_s))
+    settled = [(_settled(curves, span), _fault_s(curves, span)) for span in spans]
+    judged = [(_Touch(curves, touch, window), fault_s) for touch, fault_s in settled if touch is not None]
+    touches = [touch for touch, _ in judged]
+    faults_s = [fault_s for _, fault_s in settled if fault_s is not None]
+    still = sum(fault_s is not None and touch.still(limit_m) for touch, fault_s in judged)
     worst = max((touch.worst for touch in touches), default=(0.0, 0.0, 0.0))
     felt = [index for touch in touches for index in touch.felt(limit_m)]
     return Stability(
@@ -119,6 +154,10 @@ def judge(curves: Curves) -> Stability:
         limit_m=limit_m,
         step_m=step_m,
         felt=max(felt, default=float("nan")),
+        forceless_s=float(np.count_nonzero(curves.inside & ~curves.held)) * curves.period_s,
+        faulted=len(faults_s),
+        faulted_moving=len(faults_s) - still,
+        fault_s=min(faults_s, default=float("nan")),
     )
 
 
@@ -160,6 +199,10 @@ class _Touch:
             return ringing
         return sum(span_m > limit_m for span_m in self.spans_m[ringing:])
 
+    def still(self, limit_m: float) -> bool:
+        """Whether it was still and stayed so to its end."""
+        return self.ringing(limit_m) < len(self.spans_m) and not self.shaking(limit_m)
+
     def felt(self, limit_m: float) -> list[float]:
         """The felt index of each second that was still."""
         long = round(FELT_WINDOW_S / self.window_s)
@@ -172,20 +215,29 @@ class _Touch:
 
 
 def _touches(curves: Curves) -> list[slice]:
-    """The ticks of each touch after its arrival."""
+    """The ticks of each touch, from the arrival to the last one at the wall."""
     time_s = curves["t_s"]
-    inside = np.flatnonzero(curves.inside)
-    if not len(inside):
+    held = np.flatnonzero(curves.held)
+    if not len(held):
         return []
-    apart = np.diff(time_s[inside]) > BOUNCE_S
-    begins = inside[np.concatenate(([0], np.flatnonzero(apart) + 1))]
-    ends = inside[np.concatenate((np.flatnonzero(apart), [len(inside) - 1]))]
-    touches = []
-    for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
-        settled = int(np.searchsorted(time_s, time_s[begin] + ARRIVAL_S))
-        if settled <= end:
-            touches.append(slice(settled, end + 1))
-    return touches
+    apart = np.diff(time_s[held]) > BOUNCE_S
+    begins = held[np.concatenate(([0], np.flatnonzero(apart) + 1))]
+    ends = held[np.concatenate((np.flatnonzero(apart), [len(held) - 1]))]
+    return [slice(begin, end + 1) for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)]
+
+
+def _settled(curves: Curves, touch: slice) -> slice | None:
+    """What comes of a touch after its arrival; None where nothing does."""
+    time_s = curves["t_s"]
+    settled = int(np.searchsorted(time_s, time_s[touch.start] + ARRIVAL_S))
+    return slice(settled, touch.stop) if settled < touch.stop else None
+
+
+def _fault_s(curves: Curves, touch: slice) -> float | None:
+    """When a fault ended a touch, or came while the device bounced off it; None where none did [s]."""
+    time_s = curves["t_s"]
+    begin_s, end_s = float(time_s[touch.start]), float(time_s[touch.stop - 1]) + BOUNCE_S
+    return next((fault_s for fault_s in curves.faults_s if begin_s <= fault_s <= end_s), None)
 
 
 def _slow(x_m: Array, period_s: float) -> Array:

@@ -16,9 +16,6 @@ from hapticd_views.source import Source
 
 Mark = Literal["good", "bad", "unknown"]
 
-FAULTS = range(200, 300)
-"""Codes of the events that take the force away."""
-
 _SHOWN_S = 0.02
 
 
@@ -50,19 +47,21 @@ def statements(source: Source) -> list[Statement]:
 
 
 def _stability(found: Stability, in_space: bool) -> Statement:
-    mark: Mark = "unknown" if not found.judged else "good" if found.stable else "bad"
+    mark: Mark = "bad" if found.unstable else "good" if found.stable else "unknown"
     words = found.words
-    if in_space and not found.judged:
+    if in_space and not found.judged and not found.faulted:
         words = "Not judged: the scene has objects, and only what happens at a wall is judged."
     return Statement("Was it stable?", mark, words, {key: _known(value) for key, value in asdict(found).items()})
 
 
 def _law(curves: Curves, recording: Recording | None) -> Statement:
-    inside = curves.inside
+    held = curves.held
+    if curves.inside.any() and not held.any():
+        return Statement("What did the law add?", "unknown", "No force was let through at the wall.", {})
     numbers: dict[str, float | None] = {}
     text = []
-    if "damping_n_s_per_m" in curves and inside.any():
-        damping = curves["damping_n_s_per_m"][inside]
+    if "damping_n_s_per_m" in curves and held.any():
+        damping = curves["damping_n_s_per_m"][held]
         numbers["damping_median_n_s_per_m"] = float(np.median(damping))
         numbers["damping_max_n_s_per_m"] = float(damping.max())
         text.append(
@@ -92,12 +91,25 @@ def _law(curves: Curves, recording: Recording | None) -> Statement:
 
 
 def _faults(recording: Recording) -> Statement:
-    faults = [event for event in recording.events if event.code in FAULTS]
-    if not faults:
-        return Statement("Was there a fault?", "good", "None.", {"faults": 0})
-    count = f"{len(faults)} faults, the first" if len(faults) > 1 else "One"
-    text = f"{count} at {faults[0].timestamp - _first_s(recording):.2f} s: {faults[0].text} (code {faults[0].code})."
-    return Statement("Was there a fault?", "bad", text, {"faults": len(faults)})
+    faults = recording.faults
+    latched_s = _latched_s(recording)
+    numbers: dict[str, float | None] = {"faults": len(faults), "latched_s": latched_s}
+    if faults:
+        count = f"{len(faults)} faults, the first" if len(faults) > 1 else "One"
+        text = (
+            f"{count} at {faults[0].timestamp - _first_s(recording):.2f} s: {faults[0].text} (code {faults[0].code})."
+        )
+    elif latched_s is not None:
+        status = recording.topics["status"]
+        code, why = next(
+            (int(code), told)
+            for code, told, latched in zip(status["fault_code"], status["fault_text"], status["latched"], strict=True)
+            if latched
+        )
+        text = f"None, but it was stopped by one from before, at {latched_s:.2f} s: {why} (code {code})."
+    else:
+        return Statement("Was there a fault?", "good", "None.", numbers)
+    return Statement("Was there a fault?", "bad", text, numbers)
 
 
 def _machine(curves: Curves, recording: Recording) -> Statement:
@@ -127,6 +139,15 @@ def _grown(recording: Recording, name: str) -> float:
     """By how much a sum of the books has grown, restarts of the daemon apart [J]."""
     values, run = recording.ticks[name], recording.ticks["run"]
     return float(sum(values[run == one][-1] - values[run == one][0] for one in np.unique(run)))
+
+
+def _latched_s(recording: Recording) -> float | None:
+    """When a status first told that a fault had stopped the daemon, since the first tick; None: never [s]."""
+    status = recording.topics.get("status", {})
+    if "latched" not in status or not status["latched"].any():
+        return None
+    at_s = float(status["timestamp"][int(np.argmax(status["latched"]))])
+    return max(0.0, at_s - _first_s(recording))
 
 
 def _overruns(recording: Recording) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hapticd_views.recording import Recording
-from hapticd_views.report.statement import FAULTS
+from hapticd_views.recording.loop import FAULTS
 
 
 @dataclass(frozen=True, slots=True)
