@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from hapticd.offline.run import Run
@@ -22,6 +23,7 @@ def write_recording(
     more: Sequence[Event | Note | RecordedGap | Status] = (),
     left_out: range = range(0),
     late_us: Sequence[float] = (),
+    skipped: Mapping[int, int] = MappingProxyType({}),
     receipt: dict[str, Any] | None = None,
     later: Sequence[dict[str, Any]] = (),
 ) -> Path:
@@ -34,6 +36,7 @@ def write_recording(
         more: what else is in it, in order of time, after the ticks.
         left_out: ticks that did not arrive.
         late_us: how late each tick was; 10 us where not given.
+        skipped: deadlines that were skipped, by the tick before them.
         receipt: what the receipt says otherwise.
         later: what the receipts of reloads say otherwise, their timestamps at least.
     """
@@ -58,10 +61,13 @@ def write_recording(
     outward = 1.0 if wall.free_side == "positive" else -1.0
     columns = {name: column.tolist() for name, column in run.columns.items()}
     cycle = columns["cycle"][0]
+    missed = 0
     for seq in range(run.ticks):
+        missed += skipped.get(seq - 1, 0)
         if seq in left_out:
             continue
-        at_s = EPOCH_S + columns["t_s"][seq]
+        at_s = EPOCH_S + columns["t_s"][seq] + missed * run.period_s
+        deadline_ns = (seq + missed) * 1_000_000
         position_m = wall.position_m + outward * columns["x_measured_m"][seq]
         force_n, asked_n = outward * columns["force_n"][seq], outward * columns["force_requested_n"][seq]
         share = seq / run.ticks
@@ -69,7 +75,7 @@ def write_recording(
             Position(at_s, seq, (position_m,), (outward * columns["v_m_per_s"][seq],), (force_n,), (asked_n,)),
             Energy(at_s, seq, columns["energy_j"][seq], 0.0, run.dissipated_j * share, run.generated_j * share),
             Damping(at_s, seq, (columns["damping_n_s_per_m"][seq],), (bool(columns["in_contact"][seq]),), (0.0,)),
-            Timing(at_s, seq, seq * 1_000_000, late_us[seq] if len(late_us) else 10.0, 20.0, run.period_s),
+            Timing(at_s, seq, deadline_ns, late_us[seq] if len(late_us) else 10.0, 20.0, run.period_s),
         ]
         if columns["cycle"][seq] != cycle:
             cycle = columns["cycle"][seq]

@@ -148,16 +148,44 @@ def test_what_the_machine_did_is_counted(tmp_path: Path, still: Run) -> None:
     late_us[17] = 4321.0
     status = [Status(timestamp=EPOCH_S + at, seq=0, overruns=count) for at, count in ((0.5, 5), (1.5, 9))]
     gap = RecordedGap(EPOCH_S + 0.3, "hapticd/position", 299, 340, 40)
-    source = recorded(tmp_path, still, late_us=late_us, more=[gap, *status], left_out=range(300, 340))
+    skipped = {700: 3, 1200: 1, 2900: 13}
+    source = recorded(tmp_path, still, late_us=late_us, more=[gap, *status], left_out=range(300, 340), skipped=skipped)
     machine = answer(statements(source), "What did the machine")
     assert machine.mark == "bad"
     assert machine.numbers["late_max_us"] == 4321.0
     assert machine.numbers["late_median_us"] == 12.0
-    assert (machine.numbers["overruns"], machine.numbers["missing"]) == (4.0, 40)
+    assert (machine.numbers["overruns"], machine.numbers["missing"]) == (17.0, 40), "those after the last status too"
     assert "40 ticks are missing" in machine.text
     good = answer(statements(recorded(tmp_path, still)), "What did the machine")
     assert good.mark == "good"
     assert "No tick is missing" in good.text
+
+
+def test_the_time_in_which_a_lost_device_was_looked_for_is_no_skipped_deadline(tmp_path: Path, still: Run) -> None:
+    """The next loop begins its books anew as well."""
+    more = [Event(EPOCH_S + 1.5, 1501, 204, "lost", {}), Event(EPOCH_S + 3.3, 1501, 100, "the loop runs", {})]
+    source = recorded(tmp_path, still, more=more, skipped={300: 2, 1500: 1800})
+    machine = answer(statements(source), "What did the machine")
+    assert machine.numbers["overruns"] == 2.0
+    assert source.recording is not None
+    energy = source.recording.topics["energy"]
+    anew = np.where(np.arange(still.ticks) > 1500, energy["generated_j"] - energy["generated_j"][1501], 0.0)
+    begun = np.where(np.arange(still.ticks) > 1500, anew, energy["generated_j"])
+    topics = {**source.recording.topics, "energy": {**energy, "generated_j": begun}}
+    law = answer(statements(replace(source, recording=replace(source.recording, topics=topics))), "What did the law")
+    assert law.numbers["generated_j"] == pytest.approx(still.generated_j * (still.ticks - 2) / still.ticks)
+
+
+def test_without_the_timing_the_statuses_say_what_was_skipped_and_a_restart_counts_from_0(
+    tmp_path: Path, still: Run
+) -> None:
+    counts = ((0.5, 5), (1.5, 9), (2.0, 6), (2.5, 8))
+    source = recorded(tmp_path, still, more=[Status(timestamp=EPOCH_S + at, overruns=count) for at, count in counts])
+    assert source.recording is not None
+    topics = {name: table for name, table in source.recording.topics.items() if name != "timing"}
+    topics["status"] = {**topics["status"], "run": np.array([0, 0, 1, 1])}
+    alone = replace(source, recording=replace(source.recording, topics=topics))
+    assert answer(statements(alone), "What did the machine").numbers["overruns"] == 4.0 + 8.0
 
 
 def test_a_fault_is_named_with_its_time(tmp_path: Path, still: Run) -> None:

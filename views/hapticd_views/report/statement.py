@@ -136,9 +136,9 @@ def _machine(curves: Curves, recording: Recording) -> Statement:
 
 
 def _grown(recording: Recording, name: str) -> float:
-    """By how much a sum of the books has grown, restarts of the daemon apart [J]."""
-    values, run = recording.ticks[name], recording.ticks["run"]
-    return float(sum(values[run == one][-1] - values[run == one][0] for one in np.unique(run)))
+    """By how much a sum of the books has grown; each loop begins them anew [J]."""
+    values, loops = recording.ticks[name], recording.loops
+    return float(sum(values[loops == one][-1] - values[loops == one][0] for one in np.unique(loops)))
 
 
 def _latched_s(recording: Recording) -> float | None:
@@ -152,11 +152,18 @@ def _latched_s(recording: Recording) -> float | None:
 
 def _overruns(recording: Recording) -> float:
     """Deadlines that the loop skipped while it was recorded."""
+    ticks = recording.ticks
+    if "deadline_ns" in ticks:
+        rates_hz = np.array([receipt["rate_hz"] for receipt in recording.receipts])[recording.in_force]
+        periods = np.rint(np.diff(ticks["deadline_ns"]) * 1e-9 * rates_hz[1:])
+        skipped = periods - np.diff(ticks["seq"])
+        return float(skipped[np.diff(recording.loops) == 0].sum())  # of another loop, not while it was looked for
     status: dict[str, Any] = recording.topics.get("status", {})
     if "overruns" not in status:
         return 0.0
     counts, run = status["overruns"], status["run"]
-    return float(sum(counts[run == one][-1] - counts[run == one][0] for one in np.unique(run)))
+    runs = np.unique(run)  # a daemon that was started meanwhile has counted from 0
+    return float(sum(counts[run == one][-1] - (counts[run == one][0] if one == runs[0] else 0) for one in runs))
 
 
 def _first_s(recording: Recording) -> float:
