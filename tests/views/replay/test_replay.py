@@ -7,6 +7,7 @@ import json
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,13 +16,16 @@ from hapticd.config.loading import LoadedConfig, load
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.plugins import CONTROLLERS, names
 from hapticd.simulation.options import SimulationOptions
+from hapticd.telemetry.records import Event, Status, Touch
+from hapticd.tick.event import EventCode
 from hapticd_views.recording import read
+from hapticd_views.replay.begun import begun
 from hapticd_views.replay.hand import identify
 from hapticd_views.replay.motion import replay_motion
 from hapticd_views.replay.replay import Replay, replay
 from hapticd_views.replay.stretch import longest_stretch
 from tests.daemon.running import HAPTICD
-from tests.views.replay.simulated import record
+from tests.views.replay.simulated import BEGAN_S, record
 
 UNSTABLE = Path("config/wall-12-none.toml")
 
@@ -142,6 +146,128 @@ def test_the_longest_stretch_without_a_gap_is_replayed(tmp_path: Path) -> None:
     assert not made.in_contact
     short = replay(tmp_path / "run.mcap", laws=["none"], hand="motion", duration_s=0.3)
     assert short.duration_s == pytest.approx(0.301)
+
+
+def test_what_is_disarmed_or_tared_is_no_part_and_what_comes_behind_it_is_another_one(tmp_path: Path) -> None:
+    """A replay over a tare saw the handle jump by 10 mm and called for a fault of over-speed."""
+    orders = {900: "disarm", 1000: "tare", 1100: "arm"}
+    record(tmp_path / "run.mcap", pressed("none", 3000.0), 2600, orders=orders, told_every=200)
+    recording = read(tmp_path / "run.mcap")
+    assert np.flatnonzero(np.diff(recording.armed)).tolist() == [900, 1100]
+    made = replay(tmp_path / "run.mcap", laws=["none"], hand="motion")
+    recorded, again = made.traces
+    assert made.first_s >= 1.1
+    assert np.array_equal(np.asarray(again.force_n), recorded.force_n)
+    assert np.abs(recorded.force_n).max() > 1.0
+    assert not again.fault
+    closed = replay(tmp_path / "run.mcap", laws=["none"]).scores[1]
+    assert closed.position_off_m < 1e-4
+
+
+def test_a_device_that_was_lost_is_replayed_before_or_after(tmp_path: Path) -> None:
+    """`seq` goes on, and nothing but the pause and the start of the next loop tells."""
+    path = tmp_path / "run.mcap"
+    record(path, pressed("none", 3000.0), 1500, pause=(1000, 1.8))
+    assert len(longest_stretch(read(path))) <= 1000
+    events = [Event(BEGAN_S + 1.0, 1000, EventCode.STARTED, ""), Event(BEGAN_S + 1.0, 1000, EventCode.ARMED, "")]
+    record(path, pressed("none", 3000.0), 1500, more=events)
+    assert len(longest_stretch(read(path))) <= 1000
+    assert read(path).armed[1000]
+    record(path, pressed("none", 3000.0), 1500, more=[Event(BEGAN_S + 0.4, 400, EventCode.SWITCHED, "")])
+    assert longest_stretch(read(path)).first_s > 0.4
+    record(path, pressed("none", 3000.0), 1500, more=[Event(BEGAN_S + 0.9, 900, EventCode.DEVICE_LOST, "")])
+    assert len(longest_stretch(read(path))) <= 900
+
+
+def test_without_any_force_there_is_nothing_to_replay(tmp_path: Path) -> None:
+    events = [Event(BEGAN_S, 0, EventCode.STARTED, "the loop runs")]
+    record(tmp_path / "run.mcap", pressed("none", 3000.0), 300, more=events)
+    with pytest.raises(HapticdError, match="no forces were let through: there is nothing to replay"):
+        replay(tmp_path / "run.mcap", laws=["none"], hand="motion")
+
+
+CHANGING = (
+    {"at_s": 0.5, "stiffness_n_per_m": 2000.0, "damping_n_s_per_m": 4.0}, {"at_s": 1.4, "stiffness_n_per_m": 4000.0},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("begins", [0, 300, 600, 1500])
+def test_a_wall_is_where_its_changes_had_come_when_the_recording_began(tmp_path: Path, begins: int) -> None:
+    """A wall that had become stiffer before was replayed as soft as in the file, and changed 2 s too late."""
+    config = pressed("none", 3000.0).with_values({"scene.walls[0].changes": CHANGING})
+    record(tmp_path / "run.mcap", config, 2000, skip=(0, begins), told_every=100)
+    recorded, again = replay(tmp_path / "run.mcap", laws=["none"], hand="motion").traces
+    assert np.array_equal(np.asarray(again.force_n), recorded.force_n)
+    assert np.abs(recorded.force_n).max() > 1.0
+    was, closed = replay(tmp_path / "run.mcap", laws=["none"]).scores
+    assert closed.stiffness_n_per_m == pytest.approx(was.stiffness_n_per_m, rel=0.05)
+
+
+def test_a_wall_whose_statuses_tell_another_time_is_refused(tmp_path: Path) -> None:
+    """As where a device was lost, or a reload brought the wall, before the recording began."""
+    config = pressed("none", 3000.0).with_values({"scene.walls[0].changes": CHANGING})
+    stiff = Status(
+        timestamp=BEGAN_S + 1.8, seq=1800, ticks=1801, armed=True, wall_stiffness_n_per_m=(3000.0,), wall_axis=("z",),
+        wall_position_m=(0.0,),
+    )  # fmt: skip
+    record(tmp_path / "run.mcap", config, 2000, more=[stiff])
+    with pytest.raises(HapticdError, match=r"scene.walls\[0\] changes over time, and how far it had come is not told"):
+        replay(tmp_path / "run.mcap", laws=["none"], hand="motion")
+    plain = tmp_path / "plain.toml"
+    plain.write_text(pressed("none", 4000.0).text)
+    assert replay(tmp_path / "run.mcap", plain, laws=["none"], hand="motion").scores
+
+
+def test_a_reload_that_brought_the_wall_is_told_by_the_stiffness(tmp_path: Path) -> None:
+    """The wall counts from the tick behind it: here as if the loop had begun 700 ticks earlier."""
+    config = pressed("none", 3000.0).with_values({"scene.walls[0].changes": CHANGING})
+    path = tmp_path / "run.mcap"
+    record(path, config, 1600, told_every=100)
+    recording = read(path)
+    later = {name: {**table, "seq": table["seq"] + 700} for name, table in recording.topics.items()}
+    later["status"]["ticks"] = later["status"]["ticks"] + 700
+    event = {
+        "timestamp": np.array([BEGAN_S]), "seq": np.array([699]), "run": np.array([0]),
+        "code": np.array([int(EventCode.SWITCHED)]), "text": ["reloaded"], "fields": [{}],
+    }  # fmt: skip
+    moved = replace(recording, topics={**later, "event": event})
+    stretch = longest_stretch(moved)
+    wall = begun(moved, stretch, config).config.scene.walls[0]
+    again = begun(recording, longest_stretch(recording), config).config.scene.walls[0]
+    assert wall == again
+
+
+def test_where_clients_took_part_is_not_replayed(tmp_path: Path) -> None:
+    """Their force is in what was recorded, and no law of the replay has it."""
+    path = tmp_path / "run.mcap"
+    config = pressed("none", 3000.0)
+    pushed = [Touch(BEGAN_S + seq * 1e-3, seq, (1.5,), remote=0, remote_seq=7) for seq in range(1500)]
+    record(path, config, 1500, more=pushed[:1000])
+    assert longest_stretch(read(path)).first_s >= 1.0
+    record(path, config, 1500, more=pushed)
+    with pytest.raises(HapticdError, match="clients had a part in every force: there is nothing to replay"):
+        replay(path, laws=["none"])
+    remote: dict[str, Any] = {"armed": True, "remote_name": ("field",), "remote_kind": ("force",)}
+    owned = Status(timestamp=BEGAN_S, seq=0, remote_owner=("somebody",), remote_messages=(3,), **remote)
+    record(path, config, 500, more=[owned])
+    with pytest.raises(HapticdError, match="has no topic 'contact'"):
+        replay(path, laws=["none"])
+    free = replace(owned, remote_owner=("",))
+    record(path, config, 500, more=[free])
+    assert replay(path, laws=["none"], hand="motion").scores
+    record(path, config, 500, more=[replace(free, remote_kind=("object",))])
+    with pytest.raises(HapticdError, match="clients moved 'field', and a replay does not know where it is"):
+        replay(path, laws=["none"])
+
+
+def test_what_the_law_had_learned_before_is_said_to_be_missing(tmp_path: Path) -> None:
+    config = pressed("energy-cycle", 6000.0)
+    record(tmp_path / "run.mcap", config, 1600)
+    assert not replay(tmp_path / "run.mcap", laws=["energy-cycle"], hand="motion").learned
+    record(tmp_path / "run.mcap", config, 1600, skip=(0, 700))
+    made = replay(tmp_path / "run.mcap", laws=["energy-cycle"], hand="motion")
+    assert made.learned
+    assert any("had learned" in line for line in made.lines)
 
 
 def test_a_part_is_replayed_on_its_own_axes_where_another_part_has_more(tmp_path: Path) -> None:

@@ -58,6 +58,18 @@ def armed(ticks: Table, topics: Mapping[str, Table]) -> npt.NDArray[np.bool_]:
     return found
 
 
+def seqs_of(status: Table) -> npt.NDArray[np.int64]:
+    """The tick that was the newest when each status was made.
+
+    A new subscriber gets the last one again, as it was but with the `seq` of then: by the ticks it counts it is older.
+    """
+    if "ticks" not in status or "ring_drops" not in status:
+        return np.asarray(status["seq"], np.int64)
+    counted = status["ticks"] + status["ring_drops"]
+    made = np.where(counted > 0, np.minimum(status["seq"], counted - 1), status["seq"])
+    return np.asarray(made, np.int64)
+
+
 def _before(known: list[tuple[int, int, bool]]) -> bool:
     """What was before the first thing that is known: a status holds for the ticks before it, an event ends it."""
     _, order, state = known[0]
@@ -91,5 +103,5 @@ def _of_statuses(topics: Mapping[str, Table], run: int) -> list[tuple[int, int, 
     status = topics.get("status", {})
     if "armed" not in status:
         return []
-    rows = zip(status["seq"].tolist(), status["armed"].tolist(), status["run"].tolist(), strict=True)
+    rows = zip(seqs_of(status).tolist(), status["armed"].tolist(), status["run"].tolist(), strict=True)
     return [(seq, _STATUS, state) for seq, state, its in rows if its == run]

@@ -17,7 +17,7 @@ def replay_motion(stretch: Stretch, config: LoadedConfig) -> Trace:
 
     The device goes on moving as it was recorded, whatever the law's force: this judges the law, not the loop. Under the
     law and configuration of the recording the forces are the recorded ones to the last bit, as far as the law had
-    learned nothing before.
+    learned nothing before, and on a real device outside of ramps, which go by a clock that is not recorded.
 
     Args:
         stretch: what was recorded.

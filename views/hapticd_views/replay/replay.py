@@ -17,6 +17,7 @@ from hapticd.offline.rehearsal import rehearse, simulation_options
 from hapticd.plugins import CONTROLLERS, names
 from hapticd.simulation.options import SimulationOptions
 from hapticd_views.recording import read
+from hapticd_views.replay.begun import begun
 from hapticd_views.replay.hand import HandForce, identify
 from hapticd_views.replay.motion import replay_motion
 from hapticd_views.replay.scores import Score, Trace, score, table
@@ -46,6 +47,7 @@ class Replay:
         caveat: what this can and cannot show.
         first_s, duration_s: which part of the recording [s].
         in_contact: it begins inside a wall, where laws start with a ramp.
+        learned: the recorded law began with a damping that the same law has not where it is replayed.
         period_s: time between ticks [s].
         force_n: of the hand, > 0 outwards; None for a motion [N].
         traces: what was recorded first, then each law.
@@ -58,6 +60,7 @@ class Replay:
     first_s: float
     duration_s: float
     in_contact: bool
+    learned: bool
     period_s: float
     force_n: Any
     traces: tuple[Trace, ...]
@@ -68,6 +71,8 @@ class Replay:
         """The table, and what to know of it."""
         part = f"{self.file}: {self.duration_s:.3f} s from {self.first_s:.3f} s on"
         begins = ["it begins in contact, where every law starts with a ramp"] if self.in_contact else []
+        if self.learned:
+            begins.append("the recorded law had learned its damping before, and a replayed one begins without any")
         return [part, self.caveat, *begins, *table(self.scores)]
 
     @property
@@ -84,6 +89,7 @@ class Replay:
             "first_s": self.first_s,
             "duration_s": self.duration_s,
             "in_contact": self.in_contact,
+            "learned": self.learned,
             "laws": rows,
         }
 
@@ -128,7 +134,8 @@ def replay(
     """
     if hand not in HANDS:
         raise ConfigError(f"--hand {hand}: must be {' or '.join(HANDS)}")
-    stretch = longest_stretch(read(file), duration_s)
+    recording = read(file)
+    stretch = longest_stretch(recording, duration_s)
     own = stretch.config if config is None else load(config)
     if not own.config.scene.walls:
         raise ConfigError(f"{own.path}: has no wall to replay against")
@@ -146,6 +153,8 @@ def replay(
     traces = [recorded]
     for done, law in enumerate(_laws(laws, own)):
         changed = own if law == own.config.controller.law else own.with_values({"controller.law": law})
+        if config is None:
+            changed = begun(recording, stretch, changed)
         made = replay_motion(stretch, changed) if force is None else _closed(changed, force, device, period_s)
         traces.append(made)
         if progress is not None:
@@ -157,6 +166,10 @@ def replay(
         first_s=stretch.first_s,
         duration_s=len(stretch) * period_s,
         in_contact=stretch.in_contact,
+        learned=any(
+            one.law == stretch.receipt["law"] and one.damping_n_s_per_m[0] != recorded.damping_n_s_per_m[0]
+            for one in traces[1:]
+        ),
         period_s=period_s,
         force_n=None if force is None else force.force_n,
         traces=tuple(traces),

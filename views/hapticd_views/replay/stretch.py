@@ -1,4 +1,7 @@
-"""The part of a recording that is replayed: the longest one without a gap, a restart or a change of configuration."""
+"""The part of a recording that is replayed: the longest one in which forces were let through all the time.
+
+A gap, a restart, a pause and a change of configuration end it, and so does a client that has a part in the force.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,12 @@ import numpy as np
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.device import DeviceInfo
 from hapticd.errors import HapticdError
+from hapticd.tick.event import EventCode
 from hapticd_views.recording import Recording
+from hapticd_views.replay.driven import driven
 
 _FAR_M = 1e6
+_PAUSE_S = 0.05  # so much more than a period between two ticks is no motion that goes on
 _ALONG_AXES = ("position_m", "velocity_m_per_s", "force_n", "force_requested_n")
 
 
@@ -85,7 +91,7 @@ def longest_stretch(recording: Recording, most_s: float | None = None) -> Stretc
         most_s: how much of it at most [s].
 
     Raises:
-        HapticdError: there is nothing to replay.
+        HapticdError: there is nothing to replay, or a client moved an object.
     """
     if recording.receipt["every_ticks"] != 1:
         raise HapticdError(f"{recording.path}: only one tick in {recording.receipt['every_ticks']} was published")
@@ -96,9 +102,7 @@ def longest_stretch(recording: Recording, most_s: float | None = None) -> Stretc
     if len(ticks["seq"]) < 2:
         raise HapticdError(f"{recording.path}: has no ticks to replay")
     in_force = recording.in_force
-    breaks = (np.diff(ticks["seq"]) != 1) | (np.diff(ticks["run"]) != 0) | (np.diff(in_force) != 0)
-    edges = [0, *(np.nonzero(breaks)[0] + 1).tolist(), len(ticks["seq"])]
-    start, end = max(pairwise(edges), key=lambda span: span[1] - span[0])
+    start, end = _longest(recording)
     free = np.nonzero(~ticks["in_contact"][start:end].any(axis=1))[0]
     inside = not len(free) or start + int(free[0]) > end - 2
     start += 0 if inside else int(free[0])
@@ -115,3 +119,22 @@ def longest_stretch(recording: Recording, most_s: float | None = None) -> Stretc
         first_s=float(ticks["timestamp"][start] - ticks["timestamp"][0]),
         in_contact=inside,
     )
+
+
+def _longest(recording: Recording) -> tuple[int, int]:
+    """The first row of the longest part that can be replayed, and the one behind its last."""
+    ticks, armed, by_clients = recording.ticks, recording.armed, driven(recording)
+    replayed = armed & ~by_clients
+    breaks = (np.diff(ticks["seq"]) != 1) | (np.diff(recording.loops) != 0) | (np.diff(recording.in_force) != 0)
+    breaks |= np.diff(ticks["timestamp"]) > 1.0 / recording.receipt["rate_hz"] + _PAUSE_S
+    breaks |= np.diff(replayed)
+    event = recording.topics.get("event", {"code": [], "run": [], "seq": []})
+    for code, run, seq in zip(event["code"], event["run"], event["seq"], strict=True):
+        if code == EventCode.SWITCHED:  # also where the configuration is the same: it was in force behind that tick
+            breaks |= (ticks["run"][:-1] == run) & (ticks["seq"][:-1] == seq)
+    edges = [0, *(np.nonzero(breaks)[0] + 1).tolist(), len(ticks["seq"])]
+    parts = [(start, end) for start, end in pairwise(edges) if replayed[start] and end - start > 1]
+    if not parts:
+        why = "no forces were let through" if not armed.any() else "clients had a part in every force"
+        raise HapticdError(f"{recording.path}: {why}: there is nothing to replay")
+    return max(parts, key=lambda part: part[1] - part[0])
