@@ -209,6 +209,13 @@ def test_a_fault_that_only_the_statuses_tell_of_is_named_as_well(tmp_path: Path,
     assert answer(statements(recorded(tmp_path, still, more=[cleared])), "Was there a fault").mark == "good"
 
 
+def test_a_wall_that_changed_meanwhile_has_no_one_stiffness(tmp_path: Path, still: Run) -> None:
+    stiffer = Status(timestamp=EPOCH_S + 2.0, seq=2000, armed=True, wall_stiffness_n_per_m=(14e3,))
+    text = answer(statements(recorded(tmp_path, still, more=[stiffer])), "What did the law").text
+    assert " kN/m in the median" in text
+    assert "of 12 kN/m" not in text
+
+
 # -- a wall without force
 
 

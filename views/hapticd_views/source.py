@@ -109,6 +109,9 @@ def recorded(name: str, recording: Recording) -> Source:
         raise HapticdError(f"{name}: holds no tick with a position")
     receipts = [recording.receipts[number] for number in np.unique(recording.in_force).tolist()]
     stiffness = {receipt["wall_stiffness_n_per_m"][0] for receipt in receipts if receipt["wall_axis"]}
+    if stiffness and "wall_stiffness_n_per_m" in (status := recording.topics.get("status", {})):
+        told = status["wall_stiffness_n_per_m"][:, :1]
+        stiffness |= set(told[np.isfinite(told)].tolist())  # of a wall that changes over time too
     if not stiffness:
         return Source(name, _axes(name, recording), recording)
     columns = recording.wall(0)
