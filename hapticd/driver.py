@@ -85,6 +85,8 @@ class Driver(ABC, Generic[OptionsT]):
             its threads, which costs a tick no more than storing a number.
         trace: what was last said between driver and device, where a driver keeps that; it is in every fault record.
         force_left: why the last `disable` or `close` may have left a force on the device; "" when it did not.
+        forces_flow: the device follows what is written. Where it takes a moment for that, `_enable` says that it does
+            not yet and `_read` that it does; until then the loop writes no force, and the ramp of arming waits.
     """
 
     Options: ClassVar[type[DriverOptions]] = DriverOptions
@@ -98,6 +100,7 @@ class Driver(ABC, Generic[OptionsT]):
         self.trace = DriverTrace()
         self.state = DriverState.CLOSED
         self.force_left = ""
+        self.forces_flow = True
         self._info: DeviceInfo | None = None
         self._limit_squared = 0.0
         self._axes = 0
@@ -314,7 +317,7 @@ class Driver(ABC, Generic[OptionsT]):
 
     @abstractmethod
     def _enable(self) -> None:
-        """Allow forces; the first force is zero."""
+        """Allow forces; the first force is zero. It does not wait until they flow: a loop may not (`forces_flow`)."""
 
     @abstractmethod
     def _read(self) -> Sample:

@@ -190,12 +190,14 @@ class ControlLoop:
                 if late_ns > period_ns:  # a law's start is anybody's code, and a write may have stood still
                     tick.begin_late(late_ns * 1e-9)
                 wait = self._waiting()
+            if session.arming:
+                session.go_on_arming()
             if session.stop_requested and not self._stopping:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))
             if guard.mode is disarmed:
                 late = 0  # what was missed of a force that has been let go counts for no other
-                if driver.state is enabled:
+                if driver.state is enabled and not session.arming:
                     driver.disable()
                 if self._stopping:
                     return

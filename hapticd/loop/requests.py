@@ -81,9 +81,12 @@ class RequestHandler:
         return self._session.shared.words[DISARM] != self._disarms
 
     def _do_arm(self) -> Generator[None, None, None]:
-        if not self._session.arm():
-            ends = self._session.stop_requested
-            raise HapticdError("the daemon is ending" if ends else "stopped by a fault: `hapticd clear` first")
+        session = self._session
+        session.arm()
+        while session.arming:
+            yield
+        if session.refusal:
+            raise HapticdError(session.refusal)
         yield
 
     def _do_clear(self) -> Generator[None, None, None]:

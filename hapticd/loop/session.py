@@ -6,10 +6,11 @@ import time
 from typing import Any
 
 from hapticd.driver import Driver
-from hapticd.errors import DriverError
+from hapticd.errors import DriverError, PluginError
 from hapticd.loop.memory import (
     DISARM,
     DISARMED,
+    DISARMED_SINCE,
     FIELDS,
     LATCHED,
     LAW,
@@ -46,6 +47,8 @@ class Session:
         deadline_ns: when the tick under way was due [ns of CLOCK_MONOTONIC]; 0 before the first.
         stall_ns: how long the supervisor may be silent [ns].
         stop_requested: the force is to be ramped to zero and the loop to end.
+        arming: the device has been enabled and does not follow yet: the tick stays disarmed, and zero is written.
+        refusal: why the last arming has come to nothing; "" when it has not.
         said: what clients say of what they may drive.
     """
 
@@ -61,6 +64,8 @@ class Session:
         self.deadline_ns = 0
         self.stall_ns = int(stall_s * 1e9)
         self.stop_requested = False
+        self.arming = False
+        self.refusal = ""
         self.said = SlotReader(shared)
         self.said.serve(tick.ports, 0)
         tick.guard.latched = resume.latched
@@ -80,22 +85,39 @@ class Session:
         self.shared.write_event(LoopEvent(code, text, self.seq, at_ns, fields))
 
     def arm(self) -> bool:
-        """Enable the device and let forces through; False while latched or on the way out.
+        """Enable the device and let forces through: now, or once it follows; False while latched or on the way out.
 
         Raises:
             DriverError: the device refuses.
+            PluginError: the law cannot start.
         """
-        if self.tick.guard.latched or self.stop_requested:
+        self.refusal = self._stopped()
+        if self.refusal:
             return False
         self.driver.enable()
-        self.tick.arm()
-        self.event(EventCode.ARMED, "armed: forces are let through")
+        self.arming = True
+        self._let_through()
         return True
+
+    def go_on_arming(self) -> None:
+        """Let forces through once the device follows, unless something has come between: called after each tick."""
+        self.refusal = self._stopped()
+        if self.refusal:
+            self.arming = False
+            return
+        try:
+            self._let_through()
+        except PluginError as error:
+            self.refusal = str(error)
+            self.event(EventCode.DISARMED, f"stays disarmed: {error}")
 
     def disarm(self) -> None:
         """Let go: the request that waits behind no other."""
         words = self.shared.words
         asked = words[DISARM]
+        if self.arming:
+            self.arming = False
+            self.refusal = DISARMED_SINCE
         self.tick.release()
         self.event(EventCode.DISARMED, "disarmed: the force is ramped to zero")
         words[DISARMED] = asked
@@ -129,7 +151,8 @@ class Session:
         words[NEXT_SEQ] = self.seq
         words[SKIPPED] = self.skipped
         words[LAW] = self.law_count
-        words[MAY_ARM] = tick.guard.mode is Mode.ARMED and not any(tick.motion.origin_m)
+        armed = self.arming or tick.guard.mode is Mode.ARMED
+        words[MAY_ARM] = armed and not any(tick.motion.origin_m)
         words[LATCHED] = tick.guard.latched
 
     def latch(self) -> None:
@@ -145,3 +168,16 @@ class Session:
             self.arm()
         except DriverError as error:
             self.event(EventCode.DISARMED, f"stays disarmed: {error}")
+
+    def _stopped(self) -> str:
+        """Why nothing may be armed; "" when it may."""
+        if self.stop_requested:
+            return "the daemon is ending"
+        return "stopped by a fault: `hapticd clear` first" if self.tick.guard.latched else ""
+
+    def _let_through(self) -> None:
+        """Arm the tick if the device follows: else all of the force would come at once when it does."""
+        if self.driver.forces_flow:
+            self.arming = False
+            self.tick.arm()
+            self.event(EventCode.ARMED, "armed: forces are let through")

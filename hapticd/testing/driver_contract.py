@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,9 @@ from hapticd.driver import Driver, DriverState
 from hapticd.errors import DriverStateError
 
 AnyDriver = Driver[Any]
+
+FOLLOWS_S = 2.0
+"""Within this time after it was enabled a device follows what is written [s]."""
 
 
 class DriverContract:
@@ -141,6 +145,22 @@ class DriverContract:
         driver.enable()
         driver.read()
         assert not any(self.force_on_device(driver))
+        driver.close()
+
+    def test_it_says_soon_that_forces_flow_and_then_they_do(self, driver: AnyDriver) -> None:
+        """A loop writes nothing but zero before it does, and arms nothing."""
+        driver.open()
+        driver.enable()
+        end_s = time.monotonic() + FOLLOWS_S
+        while not driver.forces_flow:
+            assert time.monotonic() < end_s
+            driver.read()
+            driver.write([0.0] * len(driver.info.axes))
+        force = self.a_force(driver)
+        for _ in range(3):
+            driver.read()
+            driver.write(force)
+        assert list(self.force_on_device(driver)) == pytest.approx(force, rel=0.01)
         driver.close()
 
     def test_a_written_force_arrives(self, enabled: AnyDriver) -> None:

@@ -51,11 +51,18 @@ FATES = st.tuples(st.sampled_from(["read", "write"]), st.sampled_from(ERRORS))
 
 
 class Fated(Driver[DriverOptions]):
-    """A pressed device; what befalls it at its next read or write is set from outside."""
+    """A pressed device; what befalls it at its next read or write is set from outside.
 
-    def __init__(self, clock: Clock) -> None:
+    Args:
+        clock: the loop's.
+        prepares: reads after it was enabled before it follows what is written.
+    """
+
+    def __init__(self, clock: Clock, prepares: int) -> None:
         super().__init__(DriverOptions(), PERIOD_S)
         self.clock = clock
+        self.prepares = prepares
+        self.left = 0
         self.read_s = 0.0
         self.frozen = False
         self.fate: tuple[str, type[DriverError]] | None = None
@@ -68,16 +75,22 @@ class Fated(Driver[DriverOptions]):
 
     def _enable(self) -> None:
         self.force_n = 0.0
+        self.left = self.prepares
+        self.forces_flow = not self.left
 
     def _read(self) -> Sample:
         self._befall("read")
         self.clock.pass_s(self.read_s)
+        self.left -= 1
+        if self.left <= 0:
+            self.forces_flow = True
         if not self.frozen:
             self.sample.sequence += 1
         return self.sample
 
     def _write(self, force_n: Sequence[float]) -> None:
         self._befall("write")
+        assert self.forces_flow or not any(force_n), "it would come in one step"
         self.force_n = force_n[0]
 
     def _disable(self) -> None:
@@ -105,6 +118,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.let_go_s = -math.inf
         self.resume = FROM_START
         self.auto_arm = False
+        self.prepares = 0
 
     @initialize(auto_arm=st.booleans())
     def begin(self, auto_arm: bool) -> None:
@@ -114,7 +128,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     def start(self) -> None:
         """A loop on the device, from what the one before has left."""
-        self.driver = Fated(self.clock)
+        self.driver = Fated(self.clock, self.prepares)
         info = self.driver.open()
         self.shared = SharedMemory(RecordLayout(1, False, 8), 1000.0)
         self.events = EventReader(self.shared)
@@ -260,6 +274,7 @@ class AnyOrder(RuleBasedStateMachine):
         """A healthy device, cleared and armed, lets forces through."""
         self.driver.frozen, self.driver.fate, self.driver.read_s = False, None, 0.0
         self.driver.sample.position_m[0] = -3e-3
+        self.device_prepares(0)
         self.ticks(100)
         self.clear()
         self.ticks(2)
@@ -303,6 +318,11 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(read_s=st.sampled_from([0.0, 0.0, 2e-3, 0.03, 0.09]))
     def reads_take(self, read_s: float) -> None:
         self.driver.read_s = read_s
+
+    @rule(prepares=st.sampled_from([0, 0, 1, 10, 60]))
+    def device_prepares(self, prepares: int) -> None:
+        """From the next time on that it is enabled."""
+        self.prepares = self.driver.prepares = prepares
 
     @rule(frozen=st.booleans())
     def device_is_frozen(self, frozen: bool) -> None:

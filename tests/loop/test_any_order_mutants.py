@@ -33,6 +33,7 @@ SHOWING = [
     ["tare", "tick"],
     ["disarm", "stand", "tare", "arm", "lose", "tick"],
     ["disarm", "stand", "arm"],
+    ["disarm", "stand", "disarm while it gets ready"],
 ]
 """Orders that show a state with two owners; each of the slips below shows in at least one of them."""
 
@@ -164,6 +165,18 @@ def _(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Session, "arm", arm)
 
 
+@slip("a device that gets ready is armed though it was disarmed meanwhile")
+def _(patch: pytest.MonkeyPatch) -> None:
+    disarm = Session.disarm
+
+    def forgets(self: Session) -> None:
+        arming = self.arming
+        disarm(self)
+        self.arming = arming
+
+    patch.setattr(Session, "disarm", forgets)
+
+
 def _and_then(switch: Callable[..., Generator[None, None, None]], more: Callable[[ControlTick], Any]) -> Any:
     def both(self: ControlTick, *what: Any, **named: Any) -> Generator[None, None, None]:
         yield from switch(self, *what, **named)
@@ -202,12 +215,23 @@ def _fail(model: AnyOrder) -> None:
     model.one_tick()
 
 
+def _disarm_while_it_gets_ready(model: AnyOrder) -> None:
+    model.device_prepares(20)
+    model.arm()
+    model.ticks(3)
+    model.disarm()
+    model.ticks(30)
+    model.device_prepares(0)
+    _answered(model)
+
+
 EVENTS: dict[str, Callable[[AnyOrder], None]] = {
     "disarm": lambda model: model.disarm(),
     "lose": lambda model: model.device_is_lost(("read", DeviceDisconnectedError)),
     "stand": _stand,
     "arm": _ask("arm"),
     "arm and disarm": _ask("arm_and_disarm"),
+    "disarm while it gets ready": _disarm_while_it_gets_ready,
     "clear": _ask("clear"),
     "tare": _ask("tare"),
     "switch": _switch,

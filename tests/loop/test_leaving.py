@@ -114,6 +114,15 @@ def test_a_device_that_was_armed_may_arm_again_and_ticks_count_on(shared: Shared
     assert left.seq == LOST_AT - (where == "read")
 
 
+@pytest.mark.parametrize("error", [DeviceDisconnectedError, DeviceFaultError])
+def test_a_device_that_goes_before_it_follows_may_arm_again_unless_that_is_a_fault(
+    shared: SharedMemory, monkeypatch: pytest.MonkeyPatch, error: type[DriverError]
+) -> None:
+    monkeypatch.setattr(Vanishing, "_enable", lambda self: setattr(self, "forces_flow", False))
+    left = lose(shared, error=error("gone"))
+    assert (left.may_arm, left.latched) == (error is DeviceDisconnectedError, error is DeviceFaultError)
+
+
 def test_a_device_that_was_disarmed_stays_disarmed(shared: SharedMemory) -> None:
     def each_tick(_loop: ControlLoop, number: int) -> None:
         if number == 5:

@@ -63,6 +63,10 @@ FAULTS = {
     "nan": ("def _read(self):\n        self.sample.position_m[0] = math.nan\n        return self.sample", "are_finite"),
     "no_clock": ("def _read(self):\n        self.sample.time_ns = 7\n        return self.sample", "clock_or_count"),
     "metric": ("METRICS = (Metric('lost frames', 'x'),)", "test_its_metrics_have_names_of_their_own"),
+    "never_follows": (
+        "def _enable(self): self.on, self.forces_flow = True, False",
+        "test_it_says_soon_that_forces",
+    ),
     "kick": ("def _enable(self): self.on, self.force_n = True, [1.0, 0.0]", "test_force_is_zero_from_enable_until"),
 }
 
