@@ -70,6 +70,7 @@ class MoteusMotor(Motor):
         mark_turns: where it counts a home that it is told, forwards or backwards from 0 [turns].
         places: where it counts from as it was told; elsewhere it has restarted. Empty: that is not known [turns].
         has_counter: it counts milliseconds, so that a restart shows.
+        follows: it has followed torques since it was enabled.
         mode, fault, home_state: its registers.
         firmware, serial: what it is; "" until it has said so.
     """
@@ -78,6 +79,7 @@ class MoteusMotor(Motor):
         "absolute",
         "fault",
         "firmware",
+        "follows",
         "has_counter",
         "home_state",
         "mark_turns",
@@ -103,6 +105,7 @@ class MoteusMotor(Motor):
         self.places: tuple[float, ...] = ()
         self.has_counter = False
         self.restarted = False
+        self.follows = False
         self.firmware = ""
         self.serial = ""
 
@@ -186,6 +189,8 @@ class MoteusCrew(Crew):
         misplaced = self._misplaced()
         if misplaced:
             raise DeviceFaultError(f"{self._name}: {misplaced}")
+        for motor in self._motors:
+            motor.follows = False
         self._enabled_ns = time.monotonic_ns()
         self._say_until(self._send_no_torque, self._follows, urgent=True)
 
@@ -219,13 +224,21 @@ class MoteusCrew(Crew):
             if motor.restarted:  # it has followed the next torque at once, and its turns may count from elsewhere
                 return self._has_restarted(motor)
             if motor.mode != POSITION_MODE:
-                if motor.mode in PREPARING and time.monotonic_ns() - self._enabled_ns < PREPARING_S * 1e9:
+                if (
+                    motor.mode in PREPARING
+                    and not motor.follows
+                    and time.monotonic_ns() - self._enabled_ns < PREPARING_S * 1e9
+                ):
                     continue
                 return DeviceFaultError(
                     f"{self._name}: controller {motor.address} has let go: "
                     f"{stopped_text(motor.mode, motor.fault, 1e3 * self._watchdog_s)}"
                 )
         return None
+
+    def follow(self) -> bool:
+        """Whether none gets ready any more."""
+        return all(motor.follows for motor in self._motors)
 
     def set_home(self, turns: list[float | None]) -> None:
         """Tell each its home, which it remembers until it is switched off.
@@ -335,6 +348,8 @@ class MoteusCrew(Crew):
                 motor.turns_per_s = found[VELOCITY]
                 motor.torque_n_m = found[TORQUE]
                 motor.mode = int(found[MODE])
+                if motor.mode == POSITION_MODE:
+                    motor.follows = True
                 motor.voltage_v = VOLTS * found[VOLTAGE]
                 motor.temperature_c = found[TEMPERATURE]
                 motor.fault = int(found[FAULT])

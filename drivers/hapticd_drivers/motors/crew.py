@@ -142,6 +142,10 @@ class Crew(ABC):
         """Why a motor that was enabled lets no torque through; None when all do."""
 
     @abstractmethod
+    def follow(self) -> bool:
+        """Whether all motors follow torques since they were enabled, as far as they have said so."""
+
+    @abstractmethod
     def set_home(self, turns: list[float | None]) -> None:
         """Tell the controllers their homes, which are at these turns now, if they can remember that.
 

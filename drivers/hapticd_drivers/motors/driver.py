@@ -150,7 +150,9 @@ class MotorDriver(Driver[MotorOptionsT]):
             )
         self._sign.demand()
         with self._lock:
-            self._opened().enable()
+            crew = self._opened()
+            crew.enable()
+            self.forces_flow = crew.follow()
             self._silent = 0
 
     def _read(self) -> Sample:
@@ -165,6 +167,8 @@ class MotorDriver(Driver[MotorOptionsT]):
                 problem = crew.problem()
                 if problem is not None:
                     raise problem
+                if not self.forces_flow:
+                    self.forces_flow = crew.follow()
             elif crew.REMEMBERS or self._silent >= self._restarted_ticks:
                 for drum, motor in zip(self._drums, crew.motors, strict=True):
                     if motor.home_turns is None:

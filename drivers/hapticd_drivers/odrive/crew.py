@@ -161,6 +161,10 @@ class OdriveCrew(Crew):
                 )
         return None
 
+    def follow(self) -> bool:
+        """Whether all have said that they do."""
+        return all(motor.follows for motor in self._motors)
+
     def set_home(self, turns: list[float | None]) -> None:
         """Nothing to do: an ODrive does not say whether it still knows."""
 
@@ -170,7 +174,7 @@ class OdriveCrew(Crew):
             return
         self.enable()
         end_s = time.monotonic() + OBEYS_S
-        while not all(motor.follows for motor in self._motors) and time.monotonic() < end_s:
+        while not self.follow() and time.monotonic() < end_s:
             self.push([0.0] * len(self._motors))
             self.link.wait(_LOOK_S)
             self.hear()

@@ -25,7 +25,6 @@ class MoteusController(Controller):
         home_state: 0 to 2, by which another encoder has told it where it is.
         wakes_at_home: whether such an encoder does so when it is switched on.
         has_counter: its firmware counts milliseconds.
-        preparing: frames for which it prepares before it follows a torque.
         voltage_v: of its supply; below 10 V it gives up.
         commands: every register that the last command has set.
     """
@@ -38,7 +37,6 @@ class MoteusController(Controller):
         self.wakes_at_home = False
         self.milliseconds = 1000.0
         self.has_counter = True
-        self.preparing = 0
         self.voltage_v = 24.0
         self.commands: dict[int, Any] = {}
         self.position: float | None = None  # instead of the encoder's
@@ -48,7 +46,11 @@ class MoteusController(Controller):
 
     @property
     def torque_n_m(self) -> float:
-        return self._torque_n_m if self.mode == Mode.POSITION else 0.0
+        return self._torque_n_m if self.follows else 0.0
+
+    @property
+    def follows(self) -> bool:
+        return bool(self.mode == Mode.POSITION)
 
     def restart(self) -> None:
         """Switch it off and on: it has stopped, and has forgotten how often its shaft has turned."""
@@ -92,7 +94,7 @@ class MoteusController(Controller):
             return
         mode = int(command[Register.MODE])
         if mode in (Mode.STOPPED, Mode.BRAKE):
-            self.mode, self.fault = mode, 0
+            self.mode, self.fault, self._torque_n_m = mode, 0, 0.0
         elif mode == Mode.POSITION and self.mode not in (Mode.FAULT, Mode.TIMEOUT):
             # All that would give a torque but the one that is meant.
             assert math.isnan(command[Register.COMMAND_POSITION])

@@ -28,6 +28,7 @@ class Controller(ABC):
         shaft: its motor.
         deaf: says nothing, as one without power or with its cable out.
         peak_n_m: largest torque that it has given since this was set to 0.
+        preparing: milliseconds for which it gets ready before it follows a torque.
     """
 
     def __init__(self, address: int, shaft: Shaft) -> None:
@@ -35,11 +36,17 @@ class Controller(ABC):
         self.shaft = shaft
         self.deaf = False
         self.peak_n_m = 0.0
+        self.preparing = 0
 
     @property
     @abstractmethod
     def torque_n_m(self) -> float:
         """What it drives its motor with now."""
+
+    @property
+    @abstractmethod
+    def follows(self) -> bool:
+        """Whether it gives the torque that it is told, and does not only get ready for it."""
 
     @abstractmethod
     def hear(self, identifier: int, data: bytes) -> Frames:

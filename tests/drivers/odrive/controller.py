@@ -52,10 +52,15 @@ class OdriveController(Controller):
         self._torque_n_m = 0.0
         self._fed_s = 0.0
         self._told = 0
+        self._prepares = 0
 
     @property
     def torque_n_m(self) -> float:
-        return self._torque_n_m if self.state == CLOSED_LOOP else 0.0
+        return self._torque_n_m if self.follows else 0.0
+
+    @property
+    def follows(self) -> bool:
+        return self.state == CLOSED_LOOP
 
     def restart(self) -> None:
         """Switch it off and on."""
@@ -68,6 +73,10 @@ class OdriveController(Controller):
         return identifier == self.address << 5 | 0x0E
 
     def pass_time(self, duration_s: float) -> None:
+        if self._prepares:
+            self._prepares -= 1
+            if not self._prepares:
+                self.state, self._fed_s = CLOSED_LOOP, 0.0
         if self.state == CLOSED_LOOP:
             if self.voltage_v < 10.0:
                 self.break_down(UNDER_VOLTAGE)
@@ -91,9 +100,11 @@ class OdriveController(Controller):
             case "Set_Axis_State" if said["Axis_Requested_State"] == CLOSED_LOOP:
                 if not self.error and self.voltage_v >= 10.0:
                     assert self.mode == (1, 1), "a torque would be taken for a place"
-                    self.state = CLOSED_LOOP
-                    self._fed_s = 0.0
+                    self._prepares = self.preparing
+                    if not self.preparing:
+                        self.state, self._fed_s = CLOSED_LOOP, 0.0
             case "Set_Axis_State":
+                self._prepares = 0
                 self.state = said["Axis_Requested_State"]
             case other:
                 raise AssertionError(f"nothing of that is needed: {other}")
