@@ -47,6 +47,8 @@ class MotorMover:
     def push(self, axis: int, force_n: float) -> Moment:
         """Set the force on one axis, none on the others, and say where it is a tick later.
 
+        There is none before all motors follow: what was asked for meanwhile would come in one step.
+
         Raises:
             DriverError: called off, or a motor stopped, is silent or is gone.
         """
@@ -55,14 +57,17 @@ class MotorMover:
         while True:
             if self._called_off():
                 raise DriverStateError("called off")
-            crew.push(torques)
+            follow = crew.follow()
+            crew.push(torques if follow else [0.0] * len(torques))
             self._due_s = max(self._due_s + self._period_s, time.monotonic())
             time.sleep(max(0.0, self._due_s - time.monotonic()))
             if crew.await_states(RESTARTED_S):
                 crew.note()
                 problem = crew.problem()
                 if problem is None:
-                    break
+                    if follow:
+                        break
+                    continue
             else:
                 problem = DeviceTimeoutError(
                     f"a motor on {crew.link.where} has said nothing for {1e3 * RESTARTED_S:g} ms during the "

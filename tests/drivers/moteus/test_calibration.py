@@ -48,6 +48,18 @@ def opened(bench: Lab, **keys: Any) -> Any:
     return driver
 
 
+def test_it_pushes_with_nothing_before_the_controller_follows(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it had come to until then came in one step, or the motor was said not to move the handle."""
+    monkeypatch.setattr(moteus_crew, "PREPARING_S", PATIENCE_S)
+    driver = opened(bench)
+    asked_n_m = bench.asked_before_it_follows()
+    monkeypatch.setattr(moteus_crew.MoteusCrew, "prove_watchdog", lambda _crew: setattr(bench.first, "preparing", 300))
+    driver.calibrate()
+    assert not any(asked_n_m)
+    assert len(asked_n_m) > 290
+    driver.close()
+
+
 def test_it_finds_the_stop_and_the_controllers_remember_home(bench: Lab) -> None:
     driver = opened(bench)
     assert not driver.read().calibrated

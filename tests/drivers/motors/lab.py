@@ -78,6 +78,19 @@ class MotorLab(ABC):
         """The first controller."""
         return self.controllers[0]
 
+    def asked_before_it_follows(self) -> list[float]:
+        """The torque that the first controller is told from now on while it does not follow, ms by ms [N m]."""
+        first, asked_n_m = self.first, list[float]()
+        pass_time = first.pass_time
+
+        def note(duration_s: float) -> None:
+            if not first.follows:
+                asked_n_m.append(first._torque_n_m)
+            pass_time(duration_s)
+
+        self._monkeypatch.setattr(first, "pass_time", note)
+        return asked_n_m
+
     def plug(self) -> None:
         """Put the adapter's cable in again."""
         self.bench = Bench(self._end(), self.controllers)

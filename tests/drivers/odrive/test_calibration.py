@@ -65,6 +65,24 @@ def test_it_tries_the_watchdog_and_finds_the_stop(bench: Lab) -> None:
         again.enable()  # another start of the daemon: it has to be calibrated anew
 
 
+def test_it_pushes_with_nothing_before_the_odrive_follows(bench: Lab) -> None:
+    """What it had come to until then came in one step, or the motor was said not to move the handle."""
+    bench.first.preparing = 300
+    driver = bench.driver(
+        axes=axes(1),
+        sign_checked=False,
+        watchdog_ms=200.0,
+        calibration_speed_m_per_s=0.1,
+        calibration_force_n=BOUND_N,
+    )
+    asked_n_m = bench.asked_before_it_follows()
+    driver.open()
+    driver.calibrate()
+    assert not any(asked_n_m)
+    assert len(asked_n_m) > 300
+    driver.close()
+
+
 def lose_power(bench: Lab, driver: MotorDriver[Any]) -> None:
     """For a tenth of a second, in ticks that are not armed; then it counts from where its shaft is."""
     bench.first.deaf = True
