@@ -68,7 +68,6 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         self._button_bits = 0
         self._until_status = 0
         self._settling = 0
-        self._forces_seen = False
         self._get_pose: Callable[[], int] = _nothing
         self._get_velocity: Callable[[], int] = _nothing
         self._get_gap: Callable[[], int] | None = None
@@ -158,9 +157,9 @@ class ForceDimension(Driver[ForceDimensionOptions]):
                 "`hapticd calibrate`, which moves the arm"
             )
         self._sample.calibrated = True
-        self._until_status = self.options.status_every_ticks
+        self._until_status = 1
         self._settling = math.ceil(SETTLE_S / self.period_s)
-        self._forces_seen = False
+        self.forces_flow = False
         try:
             sdk.call("dhdSetMaxForce", self.info.max_force_n, device)
             self._where_there_is("dhdSetBrakes", 0)
@@ -288,8 +287,7 @@ class ForceDimension(Driver[ForceDimensionOptions]):
 
     def _look_at_status(self) -> None:
         """Notice that the device has taken the force away by itself, and say why; without force, whether it may."""
-        every = self.options.status_every_ticks
-        self._until_status = every
+        self._until_status = self.options.status_every_ticks
         if self.state is not DriverState.ENABLED:
             self._sample.calibrated = self._is_calibrated()
             return
@@ -299,12 +297,13 @@ class ForceDimension(Driver[ForceDimensionOptions]):
         if status[STATUS_ERROR]:
             raise DeviceFaultError(f"omega7: the device reports an error of its own ({status[STATUS_ERROR]})")
         if status[STATUS_FORCE]:
-            self._forces_seen = True
+            self.forces_flow = True
             return
-        self._settling -= every
         cause = status[STATUS_FORCE_OFF_CAUSE]
-        if self._forces_seen:
+        if self.forces_flow:
             raise DeviceFaultError(f"omega7: the device took the force away: {cause_of(cause)}")
+        self._until_status = 1  # no force comes in before it says that they are on
+        self._settling -= 1
         if self._settling <= 0:
             why = f" ({cause_of(cause)})" if cause else ""
             raise DeviceFaultError(

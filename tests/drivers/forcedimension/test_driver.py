@@ -74,7 +74,13 @@ def test_a_tick_is_one_group_of_getters_and_one_force(bench: Bench) -> None:
         driver.write([1.0, 0.0, 0.0])
     getters = ["dhdGetPosition", "dhdGetLinearVelocity", "dhdGetGripperGap"]
     force = ["dhdSetForceAndTorqueAndGripperForce"]
-    assert bench.log() == 2 * (getters + force) + [*getters, "dhdGetStatus", *force]
+    first = [*getters, "dhdGetStatus", *force]  # since the driver was enabled: whether forces flow
+    assert bench.log() == first + 2 * (getters + force)
+    bench.clear_log()
+    for _ in range(3):
+        driver.read()
+        driver.write([1.0, 0.0, 0.0])
+    assert bench.log() == first + 2 * (getters + force)
     driver.close()
 
 
@@ -328,6 +334,24 @@ def test_a_device_that_never_takes_forces_is_a_fault_but_one_that_is_slow_to_say
     driver.enable()
     with pytest.raises(DeviceFaultError, match="lets no forces through: press the FORCE button on it, then arm again"):
         go_on()
+    driver.close()
+
+
+def test_it_says_that_forces_flow_with_the_first_sample_where_the_device_does(bench: Bench) -> None:
+    bench.set(late_forces=15)
+    driver = bench.driver()
+    driver.open()
+    driver.enable()
+    flows = []
+    for _ in range(30):
+        driver.read()
+        flows.append(driver.forces_flow)
+        driver.write([0.0, 0.0, 1.0])
+        assert not (flows[-1] and bench.get("force_n", index=2) == 0.0)
+    assert flows == [tick >= 14 for tick in range(30)]
+    driver.disable()
+    driver.enable()
+    assert not driver.forces_flow
     driver.close()
 
 

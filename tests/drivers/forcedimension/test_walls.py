@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import pytest
@@ -74,6 +75,27 @@ def test_energy_cycle_holds_the_papers_walls(
     bench.set(type=device_type)
     rest = run(bench, monkeypatch, stiffness_n_per_m, "energy-cycle", rate_hz, drop_m, 6000 / rate_hz)
     assert rest.held(stiffness_n_per_m), rest
+
+
+@pytest.mark.parametrize("late_forces", [0, 3, 90])
+def test_the_force_comes_in_by_the_ramp_though_the_device_is_late_to_switch_its_motors_on(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, late_forces: int
+) -> None:
+    """It came in one step, once the ramp was over."""
+    bench.set(late_forces=late_forces, mass_kg=1e6)  # nothing moves it
+    given_n: list[float] = []
+    sleep_until = DeviceTime.sleep_until
+
+    def note(self: DeviceTime, deadline_ns: int) -> int:
+        given_n.append(bench.get("force_n", index=2))
+        return sleep_until(self, deadline_ns)
+
+    monkeypatch.setattr(DeviceTime, "sleep_until", note)
+    run(bench, monkeypatch, 1000.0, "none", 1000.0, -0.005, 0.2)
+    assert not any(given_n[:late_forces])
+    assert max(given_n) == pytest.approx(5.0, rel=0.01)
+    rising = given_n[: given_n.index(max(given_n)) + 1]
+    assert max(after - before for before, after in itertools.pairwise(rising)) <= 1.1 * 5.0 / 50.0
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])

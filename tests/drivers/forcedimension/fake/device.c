@@ -113,6 +113,10 @@ int set_force(struct device *d, const double *force_n) {
     d->force_calls++;
     if (d->mode != FORCE)
         return 0; /* nothing tells the caller: only the status does */
+    if (d->late_left > 0) { /* nor while it takes its time to switch the motors on */
+        d->late_left--;
+        return 0;
+    }
     double norm = sqrt(squared), share = 1;
     if (d->max_force_n >= 0 && norm > d->max_force_n)
         share = d->max_force_n / norm;

@@ -74,6 +74,8 @@ bool dhdHasGripper(char ID) { CALL; struct device *d = device_of(ID); return d &
 int dhdGetStatus(int *status, char ID) {
     DEVICE(d);
     int mode = (int)d->mode;
+    if (mode == FORCE && d->late_left > 0)
+        mode = IDLE;
     if (mode == FORCE && d->lag_left > 0) {
         d->lag_left--;
         mode = IDLE;
@@ -176,6 +178,7 @@ int dhdEnableForce(unsigned char val, char ID) {
     if (val && !d->button_off) { /* with the button on its front off the device takes no force, and no call says so */
         d->mode = FORCE;
         d->lag_left = d->status_lag;
+        d->late_left = d->late_forces;
         d->force_calls = 0;
         heard(d);
     }

@@ -30,7 +30,7 @@ enum cause { NONE, BUTTON, VELOCITY, WATCHDOG, SOFTWARE };
     S(gravity, 1) S(effector_kg, 0.1) S(angle_deg, 0) S(max_force_n, -1) S(window_ms, 20) \
     S(guard_us, 100) S(watchdog, 0) S(trip_m_per_s, 5) S(has_watchdog, 1) \
     S(heard_us, 0) S(updated_us, 0) S(moved_us, 0) S(started, 0) S(force_calls, 0) S(pose_calls, 0) S(updates, 0) \
-    S(status_lag, 0) S(lag_left, 0) S(stale, 0) S(frozen, 0) S(garbage, 0) S(slow_us, 0) S(slow_calls, 0) \
+    S(status_lag, 0) S(lag_left, 0) S(late_forces, 0) S(late_left, 0) S(stale, 0) S(frozen, 0) S(garbage, 0) S(slow_us, 0) S(slow_calls, 0) \
     S(refuses, 0) S(velocity_fails, 0) S(auto_init_fails, 0) S(auto_init_us, 0) S(stop_fails, 0) S(regulating, 0)
 
 /* Numbers of the bench: period of a tick, devices plugged in, what the SDK calls itself, how time passes. */
