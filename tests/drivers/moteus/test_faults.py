@@ -11,6 +11,7 @@ from hapticd.config.loading import parse
 from hapticd.errors import DeviceDisconnectedError, DeviceFaultError, DeviceTimeoutError, DriverError
 from hapticd.tick.assemble import make_tick
 from hapticd.tick.event import EventCode
+from hapticd_drivers.moteus import crew as moteus_crew
 from hapticd_drivers.motors import crew
 from hapticd_drivers.motors.metrics import TICKS_WITHOUT_STATE
 from tests.drivers.moteus.lab import Lab
@@ -105,6 +106,15 @@ def test_a_place_that_cannot_be_is_no_place(bench: Lab) -> None:
 def test_a_controller_that_prepares_is_given_its_time(bench: Lab) -> None:
     bench.first.preparing = 5
     driver = pressing(bench)
+    driver.close()
+
+
+def test_one_that_has_followed_and_gets_ready_anew_has_let_go(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also soon after it was enabled: its force would come back in one step."""
+    monkeypatch.setattr(moteus_crew, "PREPARING_S", PATIENCE_S)
+    driver = pressing(bench)
+    bench.first.preparing = 1000
+    assert ticks_until(driver, DeviceFaultError, "controller 1 has let go: it is in mode 3") <= 3
     driver.close()
 
 

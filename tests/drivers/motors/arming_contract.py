@@ -168,6 +168,22 @@ class MotorArmingContract:
             assert max(after - before for before, after in itertools.pairwise(rising)) <= MOST_STEP_N
         assert armed.codes[:2] == [EventCode.STARTED, EventCode.ARMED]
 
+    def test_one_that_has_followed_before_is_waited_for_again(self, armed: Armed) -> None:
+        driver, zero_n = armed.driver, [0.0, 0.0]
+        for preparing in (0, 20, 0):
+            armed.bench.controllers[1].preparing = preparing
+            driver.enable()
+            flows = [driver.forces_flow]
+            for _ in range(60):
+                driver.write(zero_n)
+                driver.read()
+                flows.append(driver.forces_flow)
+                assert armed.bench.controllers[1].follows or not flows[-1]
+            assert flows[-1]
+            assert sum(not flow for flow in flows) >= preparing
+            driver.disable()
+        armed.shared.close()
+
     def test_disarming_while_one_gets_ready_lets_go_at_once_and_no_force_comes(self, armed: Armed) -> None:
         armed.bench.controllers[1].preparing = 60
         words = armed.shared.words
