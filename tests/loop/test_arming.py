@@ -145,6 +145,24 @@ def test_a_fault_that_latches_lets_go_as_well(slow: Slow) -> None:
     assert slow.verdict == (None if slow.auto_arm else "stopped by a fault: `hapticd clear` first")
 
 
+def test_a_fault_that_latches_in_the_tick_in_which_the_device_follows_comes_first(slow: Slow) -> None:
+    def both() -> None:
+        slow.tick.guard.latched = slow.driver.forces_flow = True
+
+    slow.go(both)
+    assert slow.stays_disarmed
+
+
+def test_a_device_that_a_fault_has_stopped_is_not_even_enabled(slow: Slow, monkeypatch: pytest.MonkeyPatch) -> None:
+    enabled: list[bool] = []
+    monkeypatch.setattr(slow.driver, "_enable", lambda: enabled.append(True))
+    slow.tick.guard.latched = True
+    assert not slow.loop.session.arm()
+    slow.go()
+    assert enabled == []
+    assert EventCode.ARMED not in slow.codes
+
+
 def test_a_loop_that_is_to_end_ends(slow: Slow) -> None:
     slow.go(ticks=LATER)
     assert not any(slow.written)

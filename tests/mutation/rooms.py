@@ -122,7 +122,7 @@ ROOMS = {
         tuple(
             f"tests/loop/test_{name}.py"
             for name in (
-                "start", "budget", "watching", "loop", "requests", "disarming", "leaving", "memory", "ramps",
+                "start", "arming", "budget", "watching", "loop", "requests", "disarming", "leaving", "memory", "ramps",
                 "any_order_mutants", "recorded_runs", "worker",
             )
         ),
