@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from math import inf
 
@@ -242,12 +242,14 @@ class RemoteContact(SolidContact):
         self.port.force_n[:] = (0.0, 0.0, 0.0)
         self._waited_s = 0.0
 
-    def change(self, solid: Solid, along: list[Channel], limit_n: float, gain: float, at: Vector) -> None:
+    def change(
+        self, solid: Solid, along: list[Channel], held: Iterable[Proxy], limit_n: float, gain: float, at: Vector
+    ) -> None:
         """Go on with another solid in the place of this one, and without force: its shade keeps that."""
         port = self.port
         was = Pose.of(port.follower.at_m, port.turning.now)
         port.take_surface(solid)
-        super().change(solid, along, limit_n, gain, at)
+        super().change(solid, along, held, limit_n, gain, at)
         self._before_n_per_m = solid.stiffness_n_per_m
         if solid.proxy.pose != was:
             port.turning.now = unit(solid.configs[0].orientation) or port.turning.now

@@ -132,7 +132,8 @@ class Solid:
     def inherit(self, other: Solid) -> bool:
         """Take the proxy over from a solid of the same name, where this one has moved but is the same shape.
 
-        Of several objects the first must not have moved: seen from there, the others have.
+        Of several objects the first must not have moved: seen from there, the others have. Nor may the side on which
+        the proxy is have been turned away from the device.
 
         Returns:
             Whether it was; else the proxy must be found anew, where a client moves it at the place to which it has.
@@ -146,6 +147,8 @@ class Solid:
         self.proxy = copy(other.proxy)
         if moved:
             self.proxy.move(self.placed[0].pose)
+            u = (self.proxy.ux, self.proxy.uy, self.proxy.uz)
+            return sum(a * b for a, b in zip(self.proxy.pose.out(u), other.proxy.pose.out(u), strict=True)) > 0.0
         return True
 
     def _same_fields(self, other: Solid) -> bool:

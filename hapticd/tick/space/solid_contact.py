@@ -6,7 +6,7 @@ the normal turns. Each law sees a scalar of it: the force of its direction, and 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from math import inf
 
@@ -122,13 +122,12 @@ class SolidContact:
             channel.rest()
         self._stand()
 
-    def take_side(self, held: Proxy | None, x: float, y: float, z: float) -> None:
-        """Once started in another one's place, hold the device on the side on which that one holds it."""
+    def take_side(self, held: Iterable[Proxy], x: float, y: float, z: float) -> None:
+        """Begin before the side on which one of those holds the device, the first where that is outside, or anew."""
         proxy = self.solid.proxy
-        if held is not None and proxy.touching:
-            stays = place_before(proxy, proxy.others, proxy.voxels, held, x, y, z)
-            (follow if stays else place)(proxy, proxy.others, proxy.voxels, x, y, z)
-            self._stand()
+        stays = any(place_before(proxy, proxy.others, proxy.voxels, each, x, y, z) for each in held)
+        (follow if stays else place)(proxy, proxy.others, proxy.voxels, x, y, z)
+        self._stand()
 
     def rougher(self, solid: Solid, make_law: Callable[[], RunningLaw]) -> list[Channel]:
         """Channels along the surface that another solid in the place of this one needs, and this one has not."""
@@ -151,18 +150,19 @@ class SolidContact:
         shade.quiet = False
         return shade
 
-    def change(self, solid: Solid, along: list[Channel], limit_n: float, gain: float, at: Vector) -> None:
+    def change(
+        self, solid: Solid, along: list[Channel], held: Iterable[Proxy], limit_n: float, gain: float, at: Vector
+    ) -> None:
         """Go on with another solid in the place of this one, and without force: its shade keeps that.
 
-        A device that it holds stays where it was held, or with another shape on the side from which it was. For one
-        that is free nothing is known of the way since the solid was last in reach, and a change is no motion: it begins
-        anew.
-
-        What the change does to the spring is the scene's own work.
+        A device that it holds stays where it was held, or with another shape on the side from which it was, as does one
+        that another solid holds. For one that is free nothing is known of the way since the solid was last in reach,
+        and a change is no motion: it begins anew. What the change does to the spring is the scene's own work.
 
         Args:
             solid: it.
             along: channels along the surface, where it has friction and the one before had none.
+            held: what holds the device, this one or others.
             limit_n: the guard's limit for one contact [N].
             gain: how much of the force a release has left, 0 to 1.
             at: where the device is [m].
@@ -176,9 +176,9 @@ class SolidContact:
         for channel in self.channels:
             channel.rest()
         proxy = solid.proxy
-        if not stays and before.proxy.touching:
-            stays = place_before(proxy, proxy.others, proxy.voxels, before.proxy, *at)
         (follow if stays else place)(proxy, proxy.others, proxy.voxels, *at)
+        if not stays and (proxy.touching or before.proxy.touching):
+            self.take_side(held, *at)
         self._stand()
         self._restore(limit_n, gain)
 

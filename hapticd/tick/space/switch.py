@@ -5,10 +5,11 @@ An object goes on under its name: with its laws and its books, whatever about it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from hapticd.config.objects import ObjectConfig
+from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.space.solid import Solid, compile_objects
 from hapticd.tick.switch import no_law
@@ -89,3 +90,15 @@ class SpaceSwitch:
             if contact not in self.new:
                 self.laws += [(channel, make_law()) for channel in contact.channels]
                 yield
+
+
+def holding(contacts: Iterable[SolidContact], comes: Solid) -> list[Proxy]:
+    """What holds the device where a solid comes: what has an object of that one's first, then what pushes most."""
+    names = {config.name for config in comes.configs}
+
+    def later(contact: SolidContact) -> tuple[bool, float]:
+        pushes_n2 = sum(newton * newton for newton in contact.force)
+        return names.isdisjoint(config.name for config in contact.solid.configs), -pushes_n2
+
+    touched = [contact for contact in contacts if contact.solid.proxy.touching]
+    return [contact.solid.proxy for contact in sorted(touched, key=later)]

@@ -13,7 +13,6 @@ from hapticd.device import DeviceInfo, Sample
 from hapticd.errors import ConfigError
 from hapticd.shapes.pose import Vector
 from hapticd.shapes.reach import Nearby
-from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Guard, Mode
@@ -22,7 +21,7 @@ from hapticd.tick.space.books import SpaceBooks, Totals
 from hapticd.tick.space.channel import share_debt
 from hapticd.tick.space.solid import Solid, at_once, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
-from hapticd.tick.space.switch import SpaceSwitch
+from hapticd.tick.space.switch import SpaceSwitch, holding
 from hapticd.tick.switch import no_law
 from hapticd.tick.tick import ControlTick
 
@@ -126,9 +125,11 @@ class SpaceTick(ControlTick):
             if not self.has_objects:  # it is kept up only while there are objects
                 x, y, z = self.motion.position_m
                 self.at_m = (x, y, z)
+            holders = self._holders()
             for contact in switch.new:
                 contact.start(*self.at_m)
-                contact.take_side(_held_by(self.solids, contact.solid), *self.at_m)
+                if contact.in_contact:
+                    contact.take_side(holding(holders, contact.solid), *self.at_m)
             self._start_laws(switch.laws)
 
         yield from self._switch(scene, safety, make_law, start)
@@ -293,6 +294,8 @@ class SpaceTick(ControlTick):
         """Go on with the objects that have been made ready; nothing can fail from here on."""
         limit_n, gain = self.guard.limit_n, self.guard.gain
         before = _places(self.solids)
+        holders = self._holders()
+        held = [holding(holders, solid) for _, solid, _ in switch.changed]  # before the first of them is another
         for contact, solid in switch.kept:
             contact.solid.index, contact.solid.members = solid.index, solid.members
         for contact, still in switch.gone:
@@ -300,12 +303,16 @@ class SpaceTick(ControlTick):
             self.fading.append(contact)
             for channel, law in still:
                 self._take_law(channel, law)
-        for contact, solid, channels in switch.changed:
-            if any(channel.applied_n != 0.0 for channel in contact.channels):
+        for (contact, solid, channels), proxies in zip(switch.changed, held, strict=True):
+            if any(contact.force):
                 self._fade(contact)
-            contact.change(solid, channels, limit_n, gain, self.at_m)
+            contact.change(solid, channels, proxies, limit_n, gain, self.at_m)
         self.solids = switch.solids
         self.listing += _places(self.solids) != before
+
+    def _holders(self) -> list[SolidContact]:
+        """What may hold the device: the objects there are, and those that fade out as long as that is felt."""
+        return [*self.solids, *(contact for contact in self.fading if any(contact.force))]
 
     def _take_object_laws(self, switch: SpaceSwitch) -> None:
         """Put on the laws that have been started, and let come in by a ramp what is another than it was."""
@@ -382,14 +389,6 @@ class SpaceTick(ControlTick):
 
 def _object_limits(scene: SceneConfig) -> Limits:
     return {limits.name: limits for limits in port_limits(scene) if limits.kind == "object"}
-
-
-def _held_by(solids: Iterable[SolidContact], comes: Solid) -> Proxy | None:
-    """What holds the device where another solid comes; one that has an object of that one's goes before others."""
-    names = {config.name for config in comes.configs}
-    touched = [contact.solid for contact in solids if contact.solid.proxy.touching]
-    touched.sort(key=lambda solid: names.isdisjoint(config.name for config in solid.configs))
-    return touched[0].proxy if touched else None
 
 
 def _places(solids: Iterable[SolidContact]) -> list[tuple[object, ...]]:
