@@ -230,15 +230,17 @@ def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: 
             channel.taken_j -= given_j
             taken_j -= given_j
             spring_j -= channel.mean_spring_n * channel.way_m
-        lost_j = stiffness_n_per_m * proxy.lost_m2
-        ledger = contact.ledger
         stored_j = gain * solid.stored_j(stretch_m, limit_n)
+        lost_j = stiffness_n_per_m * proxy.lost_m2
+        sticking_m = sqrt(stretch_m * stretch_m + 2.0 * proxy.lost_m2)  # how long the spring was before it slipped
+        if solid.stiffness_n_per_m * sticking_m > limit_n:
+            lost_j = gain * solid.stored_j(sticking_m, limit_n) - stored_j
+        ledger = contact.ledger
         ledger.update(-1.0, taken_j, spring_j, stored_j + lost_j, normal.in_contact, normal.damping_n_s_per_m, dt_s)
         ledger.stored_j = stored_j
         ledger.dissipated_j += lost_j
         contact.friction_j += lost_j
-        along_m2 = proxy.stretch_x * proxy.stretch_x + proxy.stretch_y * proxy.stretch_y
-        contact.friction_stored_j = 0.5 * stiffness_n_per_m * (along_m2 + proxy.stretch_z * proxy.stretch_z)
+        contact.friction_stored_j = stored_j * share_along(proxy, stretch_m)
     held = gain
     if solid.stiffness_n_per_m * stretch_m > limit_n:
         held *= limit_n / (solid.stiffness_n_per_m * stretch_m)
@@ -266,6 +268,19 @@ def share_debt(channels: Sequence[Channel], debt_j: float) -> None:
     if given_j > 0.0:
         for channel in channels:
             channel.owed_j *= debt_j / given_j
+
+
+def share_along(proxy: Any, stretch_m: float) -> float:
+    """How much of the energy in a spring is of its stretch along the surface, 0 to 1.
+
+    Args:
+        proxy: of its solid.
+        stretch_m: length of the whole spring [m].
+    """
+    along_m2 = proxy.stretch_x * proxy.stretch_x + proxy.stretch_y * proxy.stretch_y
+    along_m2 += proxy.stretch_z * proxy.stretch_z
+    whole_m2 = stretch_m * stretch_m
+    return min(1.0, along_m2 / whole_m2) if whole_m2 > 0.0 else 0.0
 
 
 def stretched_m(proxy: Any) -> float:

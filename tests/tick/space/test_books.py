@@ -103,6 +103,51 @@ def test_friction_takes_what_slipping_takes_and_holds_what_sticks() -> None:
     assert rig.unbalanced_j() < 1e-14
 
 
+@pytest.mark.parametrize("law", ["none", "energy-cycle", "ring-damping"])
+@pytest.mark.parametrize("depth_m", [0.002, 0.005])
+def test_pressed_beyond_the_limit_friction_takes_what_the_hand_gives(depth_m: float, law: str) -> None:
+    """The spring is flat there, and so is what a slip takes off it: 1.18 J were told of 0.22."""
+    scene = table("floor", "plane", 12000.0, static_friction=0.5, dynamic_friction=0.4)
+    rig = Rig(scene, law).start((0.0, 0.0, 0.001)).to((0.0, 0.0, -depth_m), 300)
+    gave_j, took_j = rig.energy_j, rig.totals.friction_j
+    for at in range(1, 501):
+        rig.go((1e-4 * at, 0.0, -depth_m))
+        totals = rig.totals
+        assert 0.0 < totals.friction_stored_j < totals.ledger.stored_j
+    assert math.hypot(*rig.force) == pytest.approx(12.0)
+    assert totals.friction_j - took_j == pytest.approx(rig.energy_j - gave_j, rel=0.05)
+    assert rig.unbalanced_j() < 1e-13
+
+
+def test_a_slip_that_begins_beyond_the_limit_and_ends_below_takes_what_the_flat_spring_held() -> None:
+    """11.5 N of depth alone, and along the surface more than the rest of 12 N."""
+    scene = table("floor", "plane", 10000.0, static_friction=0.6, dynamic_friction=0.1)
+    rig = Rig(scene, "none").start((0.0, 0.0, 0.001)).to((0.0, 0.0, -0.00115), 300)
+    rig.to((0.00068, 0.0, -0.00115), 100)
+    stuck = rig.totals
+    assert stuck.friction_j == 0.0
+    assert math.hypot(*rig.force) == pytest.approx(12.0)
+    share = 0.00068**2 / (0.00068**2 + 0.00115**2)
+    assert stuck.friction_stored_j == pytest.approx(share * stuck.ledger.stored_j)
+    rig.go((0.0007, 0.0, -0.00115))
+    assert 11.5 < math.hypot(*rig.force) < 12.0
+    whole_m, left_m = math.hypot(0.0007, 0.00115), math.hypot(0.1 * 0.00115, 0.00115)
+    held_j = 12.0 * (whole_m - 0.5 * 12.0 / 10000.0)
+    assert rig.totals.friction_j == pytest.approx(held_j - 0.5 * 10000.0 * left_m**2)
+    assert rig.unbalanced_j() < 1e-15
+
+
+@pytest.mark.parametrize("stretch_m", [0.003, 0.0005])
+def test_what_sticks_holds_a_part_of_what_is_stored_beyond_the_limit_and_below(stretch_m: float) -> None:
+    """54 mJ were told of 37."""
+    scene = table("floor", "plane", 12000.0, static_friction=2.0, dynamic_friction=1.5)
+    depth_m = 0.6 * stretch_m
+    rig = Rig(scene, "none").start((0.0, 0.0, 0.001)).to((0.0, 0.0, -depth_m), 300).to((stretch_m, 0.0, -depth_m), 300)
+    totals = rig.totals
+    assert totals.friction_j == 0.0
+    assert totals.friction_stored_j == pytest.approx(totals.ledger.stored_j / 1.36)
+
+
 @pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
 def test_what_the_spring_holds_is_out_of_the_books_once_it_is_left_or_the_device_stands_anew(rough: bool) -> None:
     keys: dict[str, Any] = {"static_friction": 0.5, "dynamic_friction": 0.4} if rough else {}
