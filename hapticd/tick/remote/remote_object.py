@@ -16,7 +16,7 @@ from hapticd.tick.remote.port import Port, PortState
 from hapticd.tick.remote.said_motion import SaidMotion
 from hapticd.tick.remote.turning import Turning, unit
 from hapticd.tick.remote.update import DAMPING, ORIENTATION, POSITION, STIFFNESS, TURNING, VELOCITY, Update
-from hapticd.tick.space.channel import Channel, stretched_m
+from hapticd.tick.space.channel import Channel
 from hapticd.tick.space.solid import Solid
 from hapticd.tick.space.solid_contact import SolidContact
 
@@ -313,11 +313,7 @@ class RemoteContact(SolidContact):
             solid.stiffness_n_per_m = self._before_n_per_m = now_n_per_m
             if self.sides == 1:
                 self.normal.held_n = gain * min(now_n_per_m * self.depth_m, limit_n)
-            stored_j = 0.0
-            if self.depth_m > 0.0 and now_n_per_m > 0.0:
-                stored_j = gain * solid.stored_j(stretched_m(solid.proxy), limit_n)
-            self.moved_j += stored_j - self.ledger.stored_j
-            self.ledger.stored_j = stored_j
+            self._restore(limit_n, gain)
         self.port.force_n[:] = self.force
 
     def _carry(self, force_n: Vector) -> None:

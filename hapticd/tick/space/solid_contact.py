@@ -15,7 +15,15 @@ from hapticd.shapes.proxy import follow, place, place_before
 from hapticd.shapes.solid import Proxy
 from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
-from hapticd.tick.space.channel import Channel, lay_along, settle_along, share_debt, slip_along, stretched_m
+from hapticd.tick.space.channel import (
+    Channel,
+    lay_along,
+    settle_along,
+    share_along,
+    share_debt,
+    slip_along,
+    stretched_m,
+)
 from hapticd.tick.space.crease import TURNED, grip
 from hapticd.tick.space.solid import Solid
 
@@ -394,6 +402,8 @@ class SolidContact:
 
     def _restore(self, limit_n: float, gain: float) -> None:
         """Book what a change of the solid does to its spring."""
-        stored_j = gain * self.solid.stored_j(stretched_m(self.solid.proxy), limit_n) if self.depth_m > 0.0 else 0.0
+        stretch_m = stretched_m(self.solid.proxy) if self.depth_m > 0.0 else 0.0
+        stored_j = gain * self.solid.stored_j(stretch_m, limit_n)
+        self.friction_stored_j = stored_j * share_along(self.solid.proxy, stretch_m)
         self.moved_j += stored_j - self.ledger.stored_j
         self.ledger.stored_j = stored_j

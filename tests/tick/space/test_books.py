@@ -148,6 +148,26 @@ def test_what_sticks_holds_a_part_of_what_is_stored_beyond_the_limit_and_below(s
     assert totals.friction_stored_j == pytest.approx(totals.ledger.stored_j / 1.36)
 
 
+@pytest.mark.parametrize("remote", [False, True], ids=["still", "remote"])
+def test_a_reload_that_takes_friction_away_or_softens_it_leaves_none_of_its_spring_in_the_books(remote: bool) -> None:
+    """It stood there for ever, even once the object was gone."""
+    rough = table("floor", "plane", 12000.0, static_friction=0.9, dynamic_friction=0.8, remote=remote)
+    at = (0.0006, 0.0, -0.0008)
+    rig = Rig(rough, "none").start((0.0, 0.0, 0.001)).to((0.0, 0.0, -0.0008), 300).to(at, 100)
+    assert rig.totals.friction_stored_j == pytest.approx(0.5 * 12000.0 * 0.0006**2)
+    rig.switch(rough.replace("12000.0", "6000.0"))
+    if not remote:  # of which the surface goes there by a ramp
+        assert rig.totals.friction_stored_j == pytest.approx(0.5 * 6000.0 * 0.0006**2)
+    for _ in range(100):
+        rig.go(at)
+        assert rig.totals.friction_stored_j == pytest.approx(0.36 * rig.totals.ledger.stored_j)
+    rig.switch(table("floor", "plane", 6000.0, remote=remote))
+    assert rig.totals.friction_stored_j == 0.0
+    rig.to(at, 100)
+    assert rig.totals.friction_stored_j == 0.0
+    assert rig.unbalanced_j() < 1e-15
+
+
 @pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
 def test_what_the_spring_holds_is_out_of_the_books_once_it_is_left_or_the_device_stands_anew(rough: bool) -> None:
     keys: dict[str, Any] = {"static_friction": 0.5, "dynamic_friction": 0.4} if rough else {}
