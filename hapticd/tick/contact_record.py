@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +52,7 @@ class ObjectRecord:
         proxy_m: the point on its surface that pulls the device back [m].
         normal: the direction from the device to the surface, outward, a unit vector.
         depth_m: how far that is [m].
-        force_n: force that it applies to the device [N].
+        force_n: force that it applies to the device, with what is left of what it was before a reload [N].
         sliding: whether friction slips.
         carrier: of the objects that are one solid, the one on whose surface the proxy is.
         inside: of these, those that the device is in.
@@ -117,8 +117,18 @@ def contact_values(contact: Contact, stiffness_n_per_m: float, ledger: EnergyLed
     )
 
 
-def object_values(contact: SolidContact, x: float, y: float, z: float) -> tuple[float, ...]:
-    """The fields of `ObjectRecord`, with the device at a point of the world."""
+def object_values(
+    contact: SolidContact, fading: Iterable[SolidContact], x: float, y: float, z: float
+) -> tuple[float, ...]:
+    """The fields of `ObjectRecord`, with the device at a point of the world.
+
+    Args:
+        contact: of the object.
+        fading: those that fade out; what is left of what one of its name held is its force too.
+        x: the device, with y and z [m].
+        y: see x.
+        z: see x.
+    """
     solid = contact.solid
     proxy = solid.proxy
     depth_m = contact.depth_m
@@ -126,6 +136,11 @@ def object_values(contact: SolidContact, x: float, y: float, z: float) -> tuple[
     inside = 1 << carrier if depth_m > 0.0 else 0
     if len(solid.members) > 1 and depth_m > 0.0:
         carrier, inside = solid.shares(x, y, z)
+    force_n = contact.force
+    for each in fading:
+        if each.solid.name == solid.name:
+            fx, fy, fz = each.force
+            force_n = (force_n[0] + fx, force_n[1] + fy, force_n[2] + fz)
     return (
         solid.index,
         *contact_values(contact.normal, solid.stiffness_n_per_m, contact.ledger),
@@ -136,7 +151,7 @@ def object_values(contact: SolidContact, x: float, y: float, z: float) -> tuple[
         proxy.normal_y,
         proxy.normal_z,
         depth_m,
-        *contact.force,
+        *force_n,
         proxy.sliding,
         carrier,
         inside,

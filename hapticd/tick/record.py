@@ -272,10 +272,11 @@ class RecordLayout:
             objects = scene.objects + LISTINGS * scene.listing
             values += (objects, books.moved_j - work_j, books.friction_j, books.friction_stored_j)
             x, y, z = motion.position_m
-            near = scene.awake if len(scene.awake) <= MOST_OBJECTS else sorted(scene.awake, key=untouched)
-            shown = [each for each in near[:MOST_OBJECTS] if not each.leaving]
+            shown = [each for each in scene.awake if not each.leaving]
+            if len(shown) > MOST_OBJECTS:
+                shown = sorted(shown, key=untouched)[:MOST_OBJECTS]
             for each in shown:
-                values += object_values(each, x, y, z)
+                values += object_values(each, scene.fading, x, y, z)
             struct = self._in_space[walls][len(shown)]
             count += _WALLS * (len(shown) + 1)
         struct.pack_into(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from hapticd.config.walls import MAX_WALLS
 from hapticd.tick.contact_record import ObjectRecord
 from hapticd.tick.record import RecordLayout
@@ -17,15 +19,20 @@ FAR, TABLE, BALL, POST = range(4)
 
 
 def recorded(rig: Rig) -> ObjectRecord:
-    """The one object that is touched, as a reader of the ring finds it."""
+    """The one object that is touched."""
+    (touched,) = near(rig)
+    return touched
+
+
+def near(rig: Rig) -> list[ObjectRecord]:
+    """The objects that are touched, as a reader of the ring finds them."""
     layout = RecordLayout(3, False, MAX_WALLS)
     layout.serve(rig.tick)
     area = memoryview(bytearray(layout.size))
     layout.pack(area, 0, rig.tick, rig.sample, 7, 0, 0.0, 0.0, 0, 0)
     space = layout.unpack(area).space
     assert space is not None
-    (touched,) = [one for one in space.near if one.contact.in_contact]
-    return touched
+    return [one for one in space.near if one.contact.in_contact]
 
 
 def pressed(*points: Point) -> ObjectRecord:
@@ -87,3 +94,40 @@ def test_a_reader_looks_anew_at_who_is_who_only_where_one_came_went_or_changed_p
     for scene in (first + second, ball("first", 5000.0) + second, second + first, first, first + second):
         listings.append(rig.switch(scene).tick.listing)
     assert listings == [0, 0, 0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("remote", [False, True], ids=["still", "remote"])
+def test_what_fades_out_of_an_object_after_a_reload_is_its_force_too(remote: bool) -> None:
+    """It was said to push with 0 N where the hand felt 3 N."""
+    before = ball("ball", 3000.0, static_friction=0.5, dynamic_friction=0.4, remote=remote)
+    other = ball("other", 500.0, position_m=(0.002, 0.0, 0.0))
+    at = (0.0004, 0.0, 0.029)
+    rig = Rig(before + other, "none").start((0.0, 0.0, 0.031)).to((0.0, 0.0, 0.029), 100).to(at, 100)
+    rig.switch(before.replace("0.5", "0.7") + other)
+    for _ in range(60):
+        rig.go(at)
+        each = near(rig)
+        assert [one.index for one in each] == [0, 1]
+        assert [sum(of) for of in zip(*(one.force_n for one in each), strict=True)] == pytest.approx(rig.force)
+        assert each[0].force_n[2] > 2.8
+
+
+def test_an_object_that_comes_back_has_what_was_left_of_it() -> None:
+    rig = Rig(ball("ball") + ball("far", position_m=(0.2, 0.0, 0.0)), "none").start((0.0, 0.0, 0.031))
+    rig.to((0.0, 0.0, 0.029), 100).switch(ball("far", position_m=(0.2, 0.0, 0.0))).to((0.0, 0.0, 0.029), 5)
+    assert not near(rig), "of one that is gone nothing is told"
+    rig.switch(ball("ball") + ball("far", position_m=(0.2, 0.0, 0.0))).go((0.0, 0.0, 0.029))
+    assert recorded(rig).force_n == pytest.approx(rig.force)
+    assert rig.force[2] > 4.0
+
+
+def test_what_fades_out_takes_no_place_of_an_object_that_is_touched() -> None:
+    """A record has eight: those that faded out came first in them, and of eight that were reloaded none was told."""
+
+    def eight(more: float) -> str:
+        return "".join(ball(f"ball {at}", 100.0 + at + more) for at in range(8))
+
+    rig = Rig(eight(0.0), "none").start((0.0, 0.0, 0.031)).to((0.0, 0.0, 0.029), 100)
+    assert [one.index for one in near(rig)] == list(range(8))
+    rig.switch(eight(10.0)).go((0.0, 0.0, 0.029))
+    assert [one.index for one in near(rig)] == list(range(8))
