@@ -15,6 +15,7 @@ from math import inf, sqrt
 from typing import Any
 
 from hapticd.shapes.surface import SURFACE_M, distance, land, land_in_union, land_on_crease, trace
+from hapticd.shapes.way_out import land_outside
 
 _LEAST_M2 = 1e-16  # two places that are less than 10 nm apart are one
 _SLIDES = 10
@@ -22,7 +23,6 @@ _LEAST_SHARE = 0.01
 _CREASE = 0.02  # squared sine of 8 degrees: two faces that meet at less have no crease
 _ONE_FACE = 0.98  # cosine of 11 degrees: two normals that differ by less are of one face
 _LANDINGS = 3
-_WAY_OUT = 100
 _CONE = 1.02
 _SAME_SIDE = 0.9  # cosine of 26 degrees
 _OFF_M = (1e-4, 1e-3, 1e-2)  # before a surface that was, one that is to be may begin so far
@@ -182,6 +182,9 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
             proxy.gz = z
             proxy.d = d
             return
+        if proxy.d < 0.0:  # let be in it: free until it has left
+            release(proxy, x, y, z, d)
+            return
         if not come_in(proxy, others, voxels, x, y, z, d):
             return
     if proxy.rough:
@@ -199,7 +202,7 @@ def hold_on(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) 
     wx = proxy.gx
     wy = proxy.gy
     wz = proxy.gz
-    meet(proxy, others, voxels, gx, gy, gz)
+    meet(proxy, others, voxels, gx, gy, gz)  # where it finds no surface, the goal stays where it is
     slide(proxy, others, voxels, x, y, z)
     if proxy.depth_m > before_m:
         proxy.gx = wx
@@ -215,11 +218,10 @@ def hold_on(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) 
 def come_in(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, d: float) -> bool:
     """Stop a free device at the surface that its way meets; where it meets none it stays free, d [m] away."""
     hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, False)
-    if not hit:
+    if not hit or not meet(proxy, others, voxels, gx, gy, gz):
         release(proxy, x, y, z, d)
         return False
     proxy.touching = True
-    meet(proxy, others, voxels, gx, gy, gz)
     proxy.sx = proxy.gx
     proxy.sy = proxy.gy
     proxy.sz = proxy.gz
@@ -228,7 +230,11 @@ def come_in(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, 
 
 
 def place(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
-    """Begin at a point of the world: free, or on the surface nearest to it; what was before is forgotten."""
+    """Begin at a point of the world: free, or on the surface nearest to it; what was before is forgotten.
+
+    Where no way out of the solid is found the device is let be, free until it has left: no force is better than one
+    toward a place that is none.
+    """
     x -= proxy.px
     y -= proxy.py
     z -= proxy.pz
@@ -240,9 +246,8 @@ def place(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) ->
         z = proxy.xz * wx + proxy.yz * wy + proxy.zz * z
     d, _, _, _ = distance(proxy, others, voxels, x, y, z)
     release(proxy, x, y, z, d)
-    if d < 0.0:
+    if d < 0.0 and meet(proxy, others, voxels, x, y, z):
         proxy.touching = True
-        meet(proxy, others, voxels, x, y, z)
         slide(proxy, others, voxels, x, y, z)
         proxy.sx = proxy.gx
         proxy.sy = proxy.gy
@@ -274,7 +279,7 @@ def place_before(proxy: Any, others: Any, voxels: Any, held: Any, x: float, y: f
             y + reach_m * held.normal_y,
             z + reach_m * held.normal_z,
         )
-        if not proxy.touching:
+        if not proxy.touching and proxy.d >= 0.0:
             return True
     return False
 
@@ -292,28 +297,24 @@ def release(proxy: Any, x: float, y: float, z: float, d: float) -> None:
     proxy.lost_m2 = 0.0
 
 
-def meet(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> None:
-    """Put the goal on the surface near a point; where two shapes send it to and fro, straight out of both."""
+def meet(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> bool:
+    """Put the goal on the surface near a point; where shapes send it to and fro, straight out of all of them.
+
+    Returns:
+        whether that was found; else the goal is as it was.
+    """
     d, gx, gy, gz, nx, ny, nz = land(proxy, others, voxels, x, y, z)
     if d > SURFACE_M or d < -SURFACE_M:
-        d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
-        ux = nx
-        uy = ny
-        uz = nz
-        for _ in range(_WAY_OUT):
-            if d > -SURFACE_M:
-                break
-            x -= d * ux
-            y -= d * uy
-            z -= d * uz
-            d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
-        d, gx, gy, gz, nx, ny, nz = land(proxy, others, voxels, x, y, z)
+        d, gx, gy, gz, nx, ny, nz = land_outside(proxy, others, voxels, x, y, z)
+        if d > SURFACE_M or d < -SURFACE_M:
+            return False
     proxy.gx = gx
     proxy.gy = gy
     proxy.gz = gz
     proxy.ux = nx
     proxy.uy = ny
     proxy.uz = nz
+    return True
 
 
 def read(proxy: Any, x: float, y: float, z: float, square: float) -> None:

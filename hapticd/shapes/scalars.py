@@ -66,7 +66,8 @@ class ProxyScalars(ShapeScalars):
     """A proxy and its solid.
 
     Its state is in the solid's frame: `gx`, `gy`, `gz` the goal, where the proxy would be without friction, or the
-    device while free; `ux`, `uy`, `uz` the normal there; `d` the distance that is free around it; `sx`, `sy`, `sz`
+    device while free; `ux`, `uy`, `uz` the normal there; `d` the distance that is free around it, or < 0 where
+    the device is let be in the solid; `sx`, `sy`, `sz`
     the proxy itself where there is friction.
 
     A tick reads, in the world's frame:

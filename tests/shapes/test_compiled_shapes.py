@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -18,8 +19,9 @@ from tests.shapes.walks import SOLIDS, walk
 
 
 @cache
-def machine() -> Any:
-    inner = Machine({}, {}).compiled(follow)
+def compiled(function: Callable[..., Any]) -> Any:
+    """One of the proxy's functions, which takes rows of records instead."""
+    inner = Machine({}, {}).compiled(function)
 
     @njit(**OPTIONS)  # type: ignore[untyped-decorator]  # numba publishes no types
     def step(proxies: Any, others: Any, voxels: Any, x: Any, y: Any, z: Any) -> None:
@@ -40,18 +42,23 @@ def records(proxy: Proxy) -> tuple[Any, Any]:
     return one, others
 
 
+def voxels_of(proxy: Proxy) -> Any:
+    """Distances of its fields as numbers of 64 bits, which the loop reads them as."""
+    return np.array(proxy.voxels or [0.0], float)
+
+
 @pytest.mark.parametrize("name", SOLIDS)
 @pytest.mark.parametrize("friction", [(0.0, 0.0), (0.6, 0.4)])
 def test_compiled_and_interpreted_proxies_are_bitwise_equal(name: str, friction: tuple[float, float]) -> None:
     proxy = Proxy(SOLIDS[name], *friction)
-    voxels = np.array(proxy.voxels or [0.0], float)  # as numbers of 64 bits, which the loop reads them as
+    voxels = voxels_of(proxy)
     one, others = records(proxy)
     touched = 0
     for at, now in enumerate(walk(proxy, 7, 500, 0.5)):
         if at == 0:
             one, others = records(proxy)
             continue
-        machine()(one, others, voxels, *now.p)
+        compiled(follow)(one, others, voxels, *now.p)
         touched += proxy.touching
         for field in PROXY_KINDS:
             assert one[0][field] == getattr(proxy, field), (at, field)

@@ -364,7 +364,7 @@ class SolidContact:
         self._outside_s = self._outside_s + dt_s if self.depth_m == 0.0 else 0.0
         self.depth_m = 0.0
         self.turned = False
-        free_m = self.solid.proxy.d
+        free_m = max(self.solid.proxy.d, 0.0)  # a device that is let be in it is as good as at its surface
         vx, vy, vz = velocity
         wx, wy, wz = way
         for channel in self.channels:
