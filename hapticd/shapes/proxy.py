@@ -2,8 +2,8 @@
 
 It is traced along the device's way to where it meets the surface, slides as near to the device as it can, and stays on
 its side: edges, corners and thin plates hold (Ruspini, Kolarov and Khatib, SIGGRAPH 1997). It moves only where that
-brings it nearer to the device, which bounds what a tick can make of energy by k/2 |dp|^2. Friction holds it within a
-cone about the goal, where it would be without friction (Harwin and Melder, Eurohaptics 2002).
+brings it nearer to the device, which bounds what a tick can make of energy by k/2 |dp|^2. Where there is friction, that
+is its goal, and `hapticd.shapes.friction` says how far it stays behind.
 
 The proxy is kept in the solid's own frame: it goes with a solid that moves. Scalars alone, so that the same source
 runs interpreted in the loop and compiled in studies.
@@ -14,6 +14,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any
 
+from hapticd.shapes.friction import rub
 from hapticd.shapes.surface import SURFACE_M, distance, land, land_in_union, land_on_crease, trace
 from hapticd.shapes.way_out import land_outside
 
@@ -22,16 +23,28 @@ _SLIDES = 10
 _LEAST_SHARE = 0.01
 _CREASE = 0.02  # squared sine of 8 degrees: two faces that meet at less have no crease
 _ONE_FACE = 0.98  # cosine of 11 degrees: two normals that differ by less are of one face
-_LANDINGS = 3
-_CONE = 1.02
+_PACE = 4.0  # round a bend the goal goes no further than so many times the device's way: as on a ball, 3/4 of it deep
+_BENT = 1.0 - 1e-12
+_BEND_M = 1e-12  # what turns or falls off by less is flat
 _SAME_SIDE = 0.9  # cosine of 26 degrees
+_STEADY = 0.9998  # cosine of 1.1 degrees: a force that turns by less in a tick is changed by less than 2 %
 _OFF_M = (1e-4, 1e-3, 1e-2)  # before a surface that was, one that is to be may begin so far
 
 
-def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> bool:
+def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float, left_m: float) -> bool:
     """Move the goal along the surface, as near to the device as it can come from where it is.
 
     A way that meets another face goes on along the crease of the two; one that brings it no nearer is shortened.
+
+    Args:
+        proxy: the proxy.
+        others: the other shapes of its solid.
+        voxels: the distances of its fields.
+        px: the device, with py and pz [m].
+        py: see px.
+        pz: see px.
+        left_m: how far it may go round what bends away from it [m]. Without a bound it runs round a ball that the
+            device is past the centre of, whatever tiny way off the axis that is.
 
     Returns:
         whether the surface there faces the device's way: else it may be free.
@@ -77,6 +90,16 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
         vz = pz - z
         vv = vx * vx + vy * vy + vz * vz
         if vv < ww and -SURFACE_M <= d <= SURFACE_M:
+            if turn < _BENT:
+                vx = x - proxy.gx
+                vy = y - proxy.gy
+                vz = z - proxy.gz
+                if vx * nx + vy * ny + vz * nz < -_BEND_M:
+                    gone_m = sqrt(vx * vx + vy * vy + vz * vz)
+                    if gone_m > left_m:
+                        share *= 0.99 * left_m / sqrt(tx * tx + ty * ty + tz * tz)
+                        continue
+                    left_m -= gone_m
             gained = ww - vv
             proxy.gx = x
             proxy.gy = y
@@ -84,9 +107,9 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             proxy.ux = nx = mx
             proxy.uy = ny = my
             proxy.uz = nz = mz
-            wx = vx
-            wy = vy
-            wz = vz
+            wx = px - x
+            wy = py - y
+            wz = pz - z
             ww = vv
             if gained < proxy.least_m2 and turn > _ONE_FACE:
                 break
@@ -120,6 +143,9 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float)
             if share < _LEAST_SHARE:
                 break
     read(proxy, wx, wy, wz, ww)
+    proxy.lx = px
+    proxy.ly = py
+    proxy.lz = pz
     facing: bool = wx * nx + wy * ny + wz * nz < 0.0
     return facing
 
@@ -148,27 +174,36 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
         if proxy.exact:
             d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
             # The nearest point of a convex solid on this side, or of all the walls of a convex room.
-            if proxy.ux * nx + proxy.uy * ny + proxy.uz * nz > _SAME_SIDE or proxy.sign < 0.0:
+            turn = proxy.ux * nx + proxy.uy * ny + proxy.uz * nz
+            if turn > _SAME_SIDE or proxy.sign < 0.0:
                 if d >= 0.0:
                     release(proxy, x, y, z, d)
                     return
-                proxy.gx = x - d * nx
-                proxy.gy = y - d * ny
-                proxy.gz = z - d * nz
-                proxy.ux = nx
-                proxy.uy = ny
-                proxy.uz = nz
-                proxy.depth_m = -d
-                if proxy.turned:
-                    turn_out(proxy, nx, ny, nz)
-                else:
-                    proxy.normal_x = nx
-                    proxy.normal_y = ny
-                    proxy.normal_z = nz
-                if proxy.rough:
-                    rub(proxy, others, voxels, x, y, z)
-                return
-        if not slide(proxy, others, voxels, x, y, z) and not hold_on(proxy, others, voxels, x, y, z):
+                if turn > _STEADY or proxy.sign < 0.0 or in_reach(proxy, x, y, z, d, nx, ny, nz):
+                    proxy.gx = x - d * nx
+                    proxy.gy = y - d * ny
+                    proxy.gz = z - d * nz
+                    proxy.ux = nx
+                    proxy.uy = ny
+                    proxy.uz = nz
+                    proxy.depth_m = -d
+                    proxy.lx = x
+                    proxy.ly = y
+                    proxy.lz = z
+                    if proxy.turned:
+                        turn_out(proxy, nx, ny, nz)
+                    else:
+                        proxy.normal_x = nx
+                        proxy.normal_y = ny
+                        proxy.normal_z = nz
+                    if proxy.rough:
+                        rub(proxy, others, voxels, x, y, z)
+                    return
+        wx = x - proxy.lx
+        wy = y - proxy.ly
+        wz = z - proxy.lz
+        left_m = _PACE * sqrt(wx * wx + wy * wy + wz * wz)
+        if not slide(proxy, others, voxels, x, y, z, left_m) and not hold_on(proxy, others, voxels, x, y, z):
             return
     else:
         d, nx, ny, nz = distance(proxy, others, voxels, x, y, z)
@@ -191,6 +226,18 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
         rub(proxy, others, voxels, x, y, z)
 
 
+def in_reach(proxy: Any, x: float, y: float, z: float, d: float, nx: float, ny: float, nz: float) -> bool:
+    """Whether the goal may go to the foot of the device within this tick: no further than its pace allows."""
+    wx = x - proxy.lx
+    wy = y - proxy.ly
+    wz = z - proxy.lz
+    vx = x - d * nx - proxy.gx
+    vy = y - d * ny - proxy.gy
+    vz = z - d * nz - proxy.gz
+    near: bool = vx * vx + vy * vy + vz * vz <= _PACE * _PACE * (wx * wx + wy * wy + wz * wz)
+    return near
+
+
 def hold_on(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -> bool:
     """Of a face that the device is in front of, go on to another one behind which it is; else let it go free."""
     hit, gx, gy, gz = trace(proxy, others, voxels, proxy.gx, proxy.gy, proxy.gz, x, y, z, True)
@@ -203,7 +250,7 @@ def hold_on(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) 
     wy = proxy.gy
     wz = proxy.gz
     meet(proxy, others, voxels, gx, gy, gz)  # where it finds no surface, the goal stays where it is
-    slide(proxy, others, voxels, x, y, z)
+    slide(proxy, others, voxels, x, y, z, inf)
     if proxy.depth_m > before_m:
         proxy.gx = wx
         proxy.gy = wy
@@ -225,7 +272,7 @@ def come_in(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float, 
     proxy.sx = proxy.gx
     proxy.sy = proxy.gy
     proxy.sz = proxy.gz
-    slide(proxy, others, voxels, x, y, z)
+    slide(proxy, others, voxels, x, y, z, inf)
     return True
 
 
@@ -248,7 +295,7 @@ def place(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) ->
     release(proxy, x, y, z, d)
     if d < 0.0 and meet(proxy, others, voxels, x, y, z):
         proxy.touching = True
-        slide(proxy, others, voxels, x, y, z)
+        slide(proxy, others, voxels, x, y, z, inf)
         proxy.sx = proxy.gx
         proxy.sy = proxy.gy
         proxy.sz = proxy.gz
@@ -336,62 +383,3 @@ def turn_out(proxy: Any, x: float, y: float, z: float) -> None:
         proxy.normal_x = x
         proxy.normal_y = y
         proxy.normal_z = z
-
-
-def rub(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -> None:
-    """Hold the proxy within the cone of friction about its goal: it sticks, or slips to the cone's edge."""
-    proxy.lost_m2 = 0.0
-    ex = proxy.sx - proxy.gx
-    ey = proxy.sy - proxy.gy
-    ez = proxy.sz - proxy.gz
-    ee = ex * ex + ey * ey + ez * ez
-    friction = proxy.dynamic_friction if proxy.sliding else proxy.static_friction
-    free_m = friction * proxy.depth_m
-    if ee <= free_m * free_m:
-        proxy.sliding = False
-    else:
-        proxy.sliding = True
-        free_m = proxy.dynamic_friction * proxy.depth_m
-        share = free_m / sqrt(ee)
-        for _ in range(_LANDINGS):  # round a corner the way along the surface is longer than the straight one
-            d, x, y, z, _, _, _ = land(
-                proxy, others, voxels, proxy.gx + share * ex, proxy.gy + share * ey, proxy.gz + share * ez
-            )
-            wx = x - proxy.gx
-            wy = y - proxy.gy
-            wz = z - proxy.gz
-            vv = wx * wx + wy * wy + wz * wz
-            if vv <= _CONE * free_m * free_m + _LEAST_M2:
-                break
-            share *= 0.9 * free_m / sqrt(vv)
-        else:
-            d = 1.0  # no place found: it goes to the goal
-        wx = proxy.sx - px
-        wy = proxy.sy - py
-        wz = proxy.sz - pz
-        ww = wx * wx + wy * wy + wz * wz
-        wx = x - px
-        wy = y - py
-        wz = z - pz
-        vv = wx * wx + wy * wy + wz * wz
-        if not (vv <= ww and -SURFACE_M <= d <= SURFACE_M):
-            x = proxy.gx
-            y = proxy.gy
-            z = proxy.gz
-            vv = proxy.depth_m * proxy.depth_m
-        if vv <= ww:
-            proxy.lost_m2 = 0.5 * (ww - vv)
-            proxy.sx = x
-            proxy.sy = y
-            proxy.sz = z
-            ex = x - proxy.gx
-            ey = y - proxy.gy
-            ez = z - proxy.gz
-    if proxy.turned:
-        proxy.stretch_x = proxy.xx * ex + proxy.xy * ey + proxy.xz * ez
-        proxy.stretch_y = proxy.yx * ex + proxy.yy * ey + proxy.yz * ez
-        proxy.stretch_z = proxy.zx * ex + proxy.zy * ey + proxy.zz * ez
-    else:
-        proxy.stretch_x = ex
-        proxy.stretch_y = ey
-        proxy.stretch_z = ez

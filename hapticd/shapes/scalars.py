@@ -66,9 +66,9 @@ class ProxyScalars(ShapeScalars):
     """A proxy and its solid.
 
     Its state is in the solid's frame: `gx`, `gy`, `gz` the goal, where the proxy would be without friction, or the
-    device while free; `ux`, `uy`, `uz` the normal there; `d` the distance that is free around it, or < 0 where
-    the device is let be in the solid; `sx`, `sy`, `sz`
-    the proxy itself where there is friction.
+    device while free; `ux`, `uy`, `uz` the normal there; `d` the distance that is free around it, or < 0 where the
+    device is let be in the solid; `lx`, `ly`, `lz` the device while touching; `sx`, `sy`, `sz` the proxy itself where
+    there is friction.
 
     A tick reads, in the world's frame:
         touching: whether the device is held.
@@ -99,6 +99,9 @@ class ProxyScalars(ShapeScalars):
     touching: bool
     sliding: bool
     d: float
+    lx: float
+    ly: float
+    lz: float
     gx: float
     gy: float
     gz: float
