@@ -9,7 +9,8 @@ is the tick itself, and what it calls now and then follows below.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from hapticd.config.models import SceneConfig, VelocityConfig
@@ -198,8 +199,6 @@ class ControlTick:
         requested_n = self.requested_n
         force_n = self.force_n
         dt_s = motion.dt_s
-        for axis in self._axes:
-            requested_n[axis] = force_n[axis] = 0.0
         if dt_s > 0.0:
             contacts = []
             for contact in self._active:
@@ -220,13 +219,15 @@ class ControlTick:
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
-                self._replace_laws(contact, error, periods)
+                self._replace_laws(contact, error, periods, ())
             if law_clock is not None:
                 self.law_ns += law_clock()
         else:
             contacts = self._active
             for waiting in contacts:
                 waiting.hold(periods)
+        for axis in self._axes:
+            requested_n[axis] = force_n[axis] = 0.0
         for contact in contacts:
             wall = contact.wall
             force_n[wall.axis] += wall.outward * contact.force_n
@@ -375,11 +376,11 @@ class ControlTick:
             speed_m_per_s = math.sqrt(self.motion.speed_squared)
             self.fail(EventCode.OVER_SPEED, f"{speed_m_per_s:.3g} m/s is above the limit of {most_m_per_s:g} m/s")
 
-    def _step_blind(self, calibrated: bool, passed_s: float) -> list[float]:
-        """Let the last force out quickly, and be disarmed then."""
+    def _step_blind(self, calibrated: bool, passed_s: float, text: str = _IMPOSSIBLE) -> list[float]:
+        """Let the last force out quickly, and be disarmed then; the text is of a fault of one that is calibrated."""
         sight = self.sight
         if self.guard.mode is Mode.ARMED or sight.is_fault(calibrated):
-            self.fail(EventCode.SAMPLE_IMPOSSIBLE, _IMPOSSIBLE if calibrated else _LOST)
+            self.fail(EventCode.SAMPLE_IMPOSSIBLE, text if calibrated else _LOST)
         seen = not sight.blind or sight.gain > 0.0
         sight.let_out(self.force_n, calibrated, passed_s)
         if sight.gain == 0.0:
@@ -398,13 +399,16 @@ class ControlTick:
         self._stand()
         self._blend_all()
 
-    def _replace_laws(self, contact: Contact, error: BaseException, periods: float) -> None:
-        """The law of a contact raised or returned nonsense: all are replaced, and asked again."""
+    def _replace_laws(
+        self, contact: Contact, error: BaseException, periods: float, more: Iterable[Callable[[float], None]]
+    ) -> None:
+        """The law of a contact raised or returned nonsense: all are replaced, and asked again, those of `more` too."""
         name = contact.law.module.__name__
         self.fail_law(EventCode.LAW_FAILED, f"law {name}: {in_words(error, name)}")
         self._begin_late(math.inf)
-        for each in self._active:
-            each.act(periods)
+        for act in (*(each.act for each in self._active), *more):
+            with suppress(ArithmeticError):  # a spring that is no number keeps the force that it had, which fades out
+                act(periods)
 
     def _drop_gone(self) -> None:
         """Close the books of walls whose force has faded out."""

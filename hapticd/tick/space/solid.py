@@ -29,6 +29,9 @@ T = TypeVar("T")
 FASTEST_M_PER_S = 5.0
 """A device that is faster may be inside a thin object before it is looked for [m/s]."""
 
+FARTHEST_M = 1e3
+"""No device is as deep in anything [m]."""
+
 _SURFACE = ("stiffness_n_per_m", "damping_n_s_per_m", "static_friction", "dynamic_friction")
 
 
@@ -89,6 +92,11 @@ class Solid:
         self.damping_n_s_per_m = first.damping_n_s_per_m
         self.rough = first.static_friction > 0.0
         self.creases = len(self.placed) > 1 or any(each.creases for each in self.placed)
+
+    @property
+    def place(self) -> str:
+        """Where it is in the file, and its name."""
+        return f'scene.objects[{self.index}] "{self.name}"'
 
     def stored_j(self, stretch_m: float, limit_n: float) -> float:
         """Energy in the spring [J]: k s^2 / 2, and force times length where the guard's limit flattens it.
@@ -158,6 +166,14 @@ class Solid:
     def let_go(self) -> None:
         """Be gone: without force from now on."""
         self.stiffness_n_per_m = self.damping_n_s_per_m = 0.0
+
+
+def astray(solids: Iterable[Solid]) -> str:
+    """Which of them has a surface that is further away than `FARTHEST_M`, for people."""
+    for solid in solids:
+        if not solid.proxy.depth_m < FARTHEST_M:
+            return f"{solid.place}: its surface is {solid.proxy.depth_m:.3g} m away, which is not possible"
+    return "scene.objects: where the surface is cannot be told"
 
 
 def placed(config: ObjectConfig) -> Placed:

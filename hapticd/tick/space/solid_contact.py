@@ -25,7 +25,7 @@ from hapticd.tick.space.channel import (
     stretched_m,
 )
 from hapticd.tick.space.crease import TURNED, grip
-from hapticd.tick.space.solid import Solid
+from hapticd.tick.space.solid import FARTHEST_M, Solid
 
 OUTSIDE_S = 0.5
 """How long a law that keeps time outside is asked after the touch, such as of a ring that dies away [s]."""
@@ -221,7 +221,10 @@ class SolidContact:
         if not proxy.touching:
             return not self.quiet and self._lose(velocity, way, dt_s)
         normal = self.normal
-        self.depth_m = reach_m = proxy.depth_m
+        reach_m = proxy.depth_m
+        if not reach_m < FARTHEST_M:
+            raise ArithmeticError  # compiled as well: which one it is finds `astray`
+        self.depth_m = reach_m
         nx = proxy.normal_x
         ny = proxy.normal_y
         nz = proxy.normal_z

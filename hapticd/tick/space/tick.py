@@ -19,7 +19,7 @@ from hapticd.tick.guard import Guard, Mode
 from hapticd.tick.remote.tick_ports import MakePort
 from hapticd.tick.space.books import SpaceBooks, Totals
 from hapticd.tick.space.channel import share_debt
-from hapticd.tick.space.solid import Solid, at_once, compile_objects
+from hapticd.tick.space.solid import Solid, astray, at_once, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
 from hapticd.tick.space.switch import SpaceSwitch, holding
 from hapticd.tick.switch import no_law
@@ -89,12 +89,11 @@ class SpaceTick(ControlTick):
         self._take_solids()
         if info.start_m:
             x, y, z = info.start_m
-            for contact in self.solids:
-                contact.start(x, y, z)
-                if contact.depth_m > 0.0:
+            for solid in self.solids:
+                solid.start(x, y, z)
+                if solid.depth_m > 0.0:
                     raise ConfigError(
-                        f'scene.objects[{contact.solid.index}] "{contact.solid.name}": swallows the device, which '
-                        f"starts {contact.depth_m * 1e3:.3g} mm inside it"
+                        f"{solid.solid.place}: swallows the device, which starts {solid.depth_m * 1e3:.3g} mm inside it"
                     )
 
     def switch(
@@ -184,8 +183,6 @@ class SpaceTick(ControlTick):
         requested_n = self.requested_n
         force_n = self.force_n
         dt_s = motion.dt_s
-        for axis in self._axes:
-            requested_n[axis] = force_n[axis] = 0.0
         if dt_s > 0.0:
             contacts = []
             for contact in self._active:
@@ -204,7 +201,10 @@ class SpaceTick(ControlTick):
             vx, vy, vz = velocity_m_per_s
             if self.nearby.moved_out(x, y, z):
                 self._look_around((before_x, before_y, before_z))
-            self.held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
+            try:
+                self.held = held = [solid for solid in self.awake if solid.observe(at, (vx, vy, vz), way, dt_s)]
+            except ArithmeticError:
+                return self._step_blind(sample.calibrated, passed_s, astray(each.solid for each in self.awake))
             law_clock = self.law_clock
             if law_clock is not None:
                 self.law_ns = -law_clock()
@@ -217,9 +217,7 @@ class SpaceTick(ControlTick):
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # noqa: BLE001 - a law is anybody's code, and a hand is in the device
-                self._replace_laws(contact if solid is None else solid.normal, error, periods)
-                for solid in held:
-                    solid.act(periods)
+                self._replace_laws(solid.normal if solid else contact, error, periods, [each.act for each in held])
             if law_clock is not None:
                 self.law_ns += law_clock()
         else:
@@ -231,6 +229,8 @@ class SpaceTick(ControlTick):
                 solid.hold(periods)
             for moving in self.moving:
                 moving.wait(passed_s)
+        for axis in self._axes:
+            requested_n[axis] = force_n[axis] = 0.0
         for contact in contacts:
             wall = contact.wall
             force_n[wall.axis] += wall.outward * contact.force_n
