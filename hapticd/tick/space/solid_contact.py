@@ -2,6 +2,7 @@
 
 Energy into the solid is the work of the vector that was held, E(n) = E(n-1) - F(n-1) . (p(n) - p(n-1)), exact however
 the normal turns. Each law sees a scalar of it: the force of its direction, and the way along that same direction.
+Where a solid holds, what it applies and what is booked of it are in one module: each is wrong without the others.
 """
 
 from __future__ import annotations
