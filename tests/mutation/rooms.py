@@ -82,7 +82,9 @@ ROOMS = {
     "shapes": Room(
         tuple(
             f"hapticd/shapes/{name}.py"
-            for name in ("distance", "field", "pose", "proxy", "reach", "scalars", "solid", "surface")
+            for name in (
+                "distance", "field", "friction", "pose", "proxy", "reach", "scalars", "solid", "surface", "way_out",
+            )
         ),
         ("tests/shapes", "tests/tick/space"),
     ),
@@ -141,8 +143,11 @@ ROOMS = {
         for name in ("cycle_sums", "felt_mass")
     },
     "recovery": Room(
-        ("hapticd/supervisor/recovery.py", "hapticd/loop/resume.py"),
-        ("tests/daemon/test_recovery.py", "tests/daemon/test_plugged_in.py", "tests/loop/test_leaving.py"),
+        ("hapticd/supervisor/recovery.py", "hapticd/loop/resume.py", "hapticd/loop/sources.py"),
+        (
+            *(f"tests/daemon/test_{name}.py" for name in ("recovery", "plugged_in", "edited")),
+            "tests/loop/test_leaving.py",
+        ),
     ),
     "keys": Room(
         tuple(
