@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import defaultdict
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -66,7 +67,9 @@ def test_a_device_that_has_been_away_for_long_is_tried_when_something_is_plugged
 ) -> None:
     monkeypatch.setattr(recovery, "LoopStart", Absent)
     info = Loopback(SimulationOptions(), 1e-3).open()
-    lost: Any = SimpleNamespace(exit_code=0, force_seen_to=True, shared=SimpleNamespace(words=[0] * 14), info=info)
+    lost: Any = SimpleNamespace(
+        exit_code=0, force_seen_to=True, shared=SimpleNamespace(words=defaultdict(int)), info=info
+    )
     looking = Recovery(Mock())
     nothing: Any = None
     looking.begin(lost, "unplugged")

@@ -107,10 +107,12 @@ def let_go_and_arm(double: HidDouble, daemon: Daemon) -> None:
 
 
 def ticks_of(subscriber: Subscriber, faults: list[int]) -> Iterator[tuple[int, float]]:
-    """Number and position [m] of each tick that is published; faults before it are noted."""
+    """Number and position [m] of each tick that is published until the device is lost; faults before it are noted."""
     for topic, fields in subscriber.maps():
         if topic == "hapticd/event" and 200 <= fields["code"] < 300:
             faults.append(fields["code"])
+            if fields["code"] == EventCode.DEVICE_LOST:
+                return
         if topic == "hapticd/position":
             yield fields["seq"], fields["position_m"][0]
     raise AssertionError("no ticks any more")
@@ -182,8 +184,8 @@ def test_a_write_that_stalls_costs_the_loop_no_tick_and_the_rig_its_force(double
     for _ in range(ATTEMPTS):
         press(double, daemon)
         with Subscriber(daemon.endpoint, "hapticd/position", "hapticd/event", "hapticd/status") as subscriber:
-            if subscriber.until("hapticd/status")["armed"]:  # it is connected, and hears of any fault from now on
-                stall(double, subscriber)
+            # it is connected, and hears of any fault from now on
+            if subscriber.until("hapticd/status")["armed"] and stall(double, subscriber):
                 break
         let_go_and_arm(double, daemon)  # this computer was so busy that the loop has let go by itself
     else:
@@ -193,20 +195,27 @@ def test_a_write_that_stalls_costs_the_loop_no_tick_and_the_rig_its_force(double
     press(double, daemon)
 
 
-def stall(double: HidDouble, subscriber: Subscriber) -> None:
-    """Hold a write up for as long as the loop takes to notice, and take the hand away meanwhile."""
+def stall(double: HidDouble, subscriber: Subscriber) -> bool:
+    """Hold a write up for as long as the loop takes to notice, and take the hand away meanwhile.
+
+    Returns:
+        False where it was held for longer than a disable waits for its answer: then the loop gave the rig up.
+    """
     double.tell("hold")
     held = double.look().sequence
     faults: list[int] = []
     ticks = ticks_of(subscriber, faults)
-    while not faults:
-        next(ticks)
-    for _ in range(STALLED_TICKS):
-        next(ticks)
+    for _ in ticks:
+        if faults:
+            break
+    for _ in islice(ticks, STALLED_TICKS):
+        pass
     assert double.look().sequence == held, "the write was not held"
     double.set("hand_n", 0.0)
     double.tell("release")
+    assert faults, "nothing was noticed"
     assert set(faults) <= BUSY
+    return EventCode.DEVICE_LOST not in faults
 
 
 def test_an_unplugged_rig_is_lost_and_comes_back_with_its_wall(double: HidDouble, daemon: Daemon) -> None:
