@@ -45,12 +45,17 @@ def along(n: Point, rng: random.Random) -> tuple[Point, Point, Point]:
     return (x[0], y[0], n[0]), (x[1], y[1], n[1]), (x[2], y[2], n[2])
 
 
+def turned(row: Point) -> Point:
+    """A row of a rotation that takes z to where x went."""
+    return row[1], row[2], row[0]
+
+
 def placed(kind: str, n: Point, rng: random.Random) -> Placed:
     """A shape whose surface goes through the origin and faces along a unit vector there."""
     deep_m = DEEP_M[kind]
-    rows = along(n, rng)
+    first, second, third = rows = along(n, rng)
     if kind == "capsule":  # which lies along z
-        rows = tuple((row[1], row[2], row[0]) for row in rows)  # type: ignore[assignment]  # three of them
+        rows = turned(first), turned(second), turned(third)
     pose = Pose((-deep_m * n[0], -deep_m * n[1], -deep_m * n[2]), rows)
     match kind:
         case "box":
