@@ -20,14 +20,13 @@ from hapticd.config.loading import LoadedConfig
 from hapticd.device import DeviceInfo
 from hapticd.errors import HapticdError
 from hapticd.tick.event import EventCode, LoopEvent
-from hapticd.tick.flags import Flag
+from hapticd.tick.flags import FORCES
 from hapticd.tick.record import RecordLayout, TickRecord
 from hapticd.version import __version__
 
 MAGIC = b"hapticd fault record 1\n"
 SUFFIX = ".fault"
 
-_FORCES = Flag.ARMED | Flag.RELEASING
 _LARGEST_HEADER = 1 << 24
 _KEYS = {"event", "instance", "version", "device", "driver", "config", "law", "ticks"}
 _EVENT_KEYS = {"code", "name", "text", "seq", "deadline_ns", "timestamp"}
@@ -224,7 +223,7 @@ def _ramp_ticks(after: Sequence[TickRecord]) -> int | None:
 
     Somebody may arm it again within the record: that force is another one.
     """
-    disarmed = next((index for index, tick in enumerate(after) if not tick.flags & _FORCES), None)
+    disarmed = next((index for index, tick in enumerate(after) if not tick.flags & FORCES), None)
     if disarmed is None:
         return None
     return max((index + 1 for index, tick in enumerate(after[: disarmed + 1]) if any(tick.force_n)), default=0)

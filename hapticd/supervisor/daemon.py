@@ -36,7 +36,7 @@ from hapticd.supervisor.terminal import Terminal
 from hapticd.telemetry.clock import followed_offset_ns, measure_epoch_offset_ns
 from hapticd.telemetry.publisher import Publisher
 from hapticd.tick.event import EventCode, LoopEvent
-from hapticd.tick.flags import Flag
+from hapticd.tick.flags import FORCES, Flag
 from hapticd.tick.record import TickRecord
 
 DRAIN_S = 0.01
@@ -51,8 +51,6 @@ STOP_TIMEOUT_S = 3.0
 
 RECORD_TIMEOUT_S = 3.0
 """How long the end of the daemon waits for a fault record that is being written [s]."""
-
-_FORCES = Flag.ARMED | Flag.RELEASING
 
 
 def pause_s(flush_due_ns: int | None, now_ns: int) -> float:
@@ -307,7 +305,7 @@ class Daemon:
         ended = state.loop.exit_code is not None
         while ended and self._publish():
             pass
-        if self._stopping and not (state.status.last and state.status.last.flags & _FORCES):
+        if self._stopping and not (state.status.last and state.status.last.flags & FORCES):
             state.loop.stall_s = STOP_TIMEOUT_S  # without a force, and a driver may take its time to let go
         if self._device_lost is not None and state.status.last is not None and not self._stopping:
             self._begin_recovery(self._device_lost)

@@ -14,3 +14,7 @@ class Flag(enum.IntFlag):
     LATCHED = 8  # stopped by a fault until cleared
     LIMITED = 16  # the guard reduced the force in this tick
     UNCALIBRATED = 32  # the device does not know where it is
+
+
+FORCES = Flag.ARMED | Flag.RELEASING
+"""Either of them: there may be a force."""
