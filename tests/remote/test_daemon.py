@@ -41,8 +41,8 @@ LARGEST_STEP_N = 0.5
 BURSTS, BURST, PAUSE_S = 20, 100, 0.01
 """A stretch of the flood: so many times so many messages, 10,000 a second in all."""
 
-UNDAMPED = CONFIG + '[remote]\nlaw = "none"\n'
-"""What a law takes is none of what is looked at here."""
+UNDAMPED = CONFIG + '[remote]\nlaw = "none"\nlease_s = 5.0\n'
+"""What a law takes is none of what is looked at here; and who has no processor for a second still sees a lease."""
 
 FIRM = UNDAMPED.replace("damping_n_s_per_m = 5.0 }", "damping_n_s_per_m = 5.0, stiffness_n_per_m = 300.0 }")
 """A hand that is not drawn along, so that there is a force to let go of."""
