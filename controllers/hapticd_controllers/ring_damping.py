@@ -7,7 +7,8 @@ held force that amount is known beforehand: (k dt / 2) sum v^2 dt. So damping ha
     base  = leaks k dt / 2                                 leaks >= 1: what the sampled spring generates, and more where
                                                            swings do not die away (a delay, a slow actuator)
     brake = 2 ratio sqrt(k m), with the base m / (2 dt)    while the contact swings by itself
-          = (4 / pi) ratio k t                             t after the touch, until the first turn
+          = (4 / pi) ratio k t                             t after the touch, until the first turn, and let out from
+                                                           45 ms on as it came: it is a hand's, and feels no step
 
 A *swing* runs from one turn of the position to the next. Its half period h tells the mass, m = k (h / pi)^2 + B dt,
 and whether it is the contact's own or a hand's: no hand turns within 45 ms. k is what the device was given of the wall,
@@ -386,8 +387,9 @@ def _set_damping(state: Any, params: Any, stiffness: float, dt_s: float) -> None
     if state.brake > 0.0:
         most = max(base, MOST_OF_MASS * state.felt_mass_kg / dt_s)
         damping = _bounded(min(most, base + _full(state, state.brake, stiffness, dt_s)))
-    elif state.arrives and state.swing_s <= params.hand_half_period_s:
-        brake = QUARTER * state.first_brake * stiffness * state.swing_s
+    elif state.arrives and state.swing_s < 2.0 * params.hand_half_period_s:
+        brake_s = min(state.swing_s, 2.0 * params.hand_half_period_s - state.swing_s)  # a hand's is let out as it came
+        brake = QUARTER * state.first_brake * stiffness * brake_s
         if state.felt_mass_kg > 0.0:
             brake = min(brake, _full(state, state.first_brake, stiffness, dt_s))
         damping = _bounded(base + brake)
