@@ -23,11 +23,9 @@ _SLIDES = 10
 _LEAST_SHARE = 0.01
 _CREASE = 0.02  # squared sine of 8 degrees: two faces that meet at less have no crease
 _ONE_FACE = 0.98  # cosine of 11 degrees: two normals that differ by less are of one face
-_PACE = 4.0  # round a bend the goal goes no further than so many times the device's way: as on a ball, 3/4 of it deep
-_BENT = 1.0 - 1e-12
-_BEND_M = 1e-12  # what turns or falls off by less is flat
+_PACE = 4.0  # in a tick the goal goes no further than so many times the device's way: as on a ball, 3/4 of it deep
 _SAME_SIDE = 0.9  # cosine of 26 degrees
-_STEADY = 0.9998  # cosine of 1.1 degrees: a force that turns by less in a tick is changed by less than 2 %
+_LITTLE = 4e-4  # square of a share of the depth: a goal that goes no further than 2 % changes the force by no more
 _OFF_M = (1e-4, 1e-3, 1e-2)  # before a surface that was, one that is to be may begin so far
 
 
@@ -43,8 +41,8 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float,
         px: the device, with py and pz [m].
         py: see px.
         pz: see px.
-        left_m: how far it may go round what bends away from it [m]. Without a bound it runs round a ball that the
-            device is past the centre of, whatever tiny way off the axis that is.
+        left_m: how far it may go [m]. Without a bound it runs round a ball that the device is past the centre of,
+            whatever tiny way off the axis that is, and off a rounded edge that the device is deep in, all in one tick.
 
     Returns:
         whether the surface there faces the device's way: else it may be free.
@@ -90,16 +88,14 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float,
         vz = pz - z
         vv = vx * vx + vy * vy + vz * vz
         if vv < ww and -SURFACE_M <= d <= SURFACE_M:
-            if turn < _BENT:
-                vx = x - proxy.gx
-                vy = y - proxy.gy
-                vz = z - proxy.gz
-                if vx * nx + vy * ny + vz * nz < -_BEND_M:
-                    gone_m = sqrt(vx * vx + vy * vy + vz * vz)
-                    if gone_m > left_m:
-                        share *= 0.99 * left_m / sqrt(tx * tx + ty * ty + tz * tz)
-                        continue
-                    left_m -= gone_m
+            vx = x - proxy.gx
+            vy = y - proxy.gy
+            vz = z - proxy.gz
+            gone_m = sqrt(vx * vx + vy * vy + vz * vz)
+            if gone_m > left_m:
+                share *= 0.99 * left_m / gone_m
+                continue
+            left_m -= gone_m
             gained = ww - vv
             proxy.gx = x
             proxy.gy = y
@@ -143,6 +139,7 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float,
             if share < _LEAST_SHARE:
                 break
     read(proxy, wx, wy, wz, ww)
+    proxy.left_m = left_m
     proxy.lx = px
     proxy.ly = py
     proxy.lz = pz
@@ -179,7 +176,7 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
                 if d >= 0.0:
                     release(proxy, x, y, z, d)
                     return
-                if turn > _STEADY or proxy.sign < 0.0 or in_reach(proxy, x, y, z, d, nx, ny, nz):
+                if proxy.sign < 0.0 or in_reach(proxy, x, y, z, d, nx, ny, nz):
                     proxy.gx = x - d * nx
                     proxy.gy = y - d * ny
                     proxy.gz = z - d * nz
@@ -227,14 +224,17 @@ def follow(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) -
 
 
 def in_reach(proxy: Any, x: float, y: float, z: float, d: float, nx: float, ny: float, nz: float) -> bool:
-    """Whether the goal may go to the foot of the device within this tick: no further than its pace allows."""
-    wx = x - proxy.lx
-    wy = y - proxy.ly
-    wz = z - proxy.lz
+    """Whether the goal may go to the foot of the device within this tick: as far as its pace allows, or by little."""
     vx = x - d * nx - proxy.gx
     vy = y - d * ny - proxy.gy
     vz = z - d * nz - proxy.gz
-    near: bool = vx * vx + vy * vy + vz * vz <= _PACE * _PACE * (wx * wx + wy * wy + wz * wz)
+    gone_m2 = vx * vx + vy * vy + vz * vz
+    if gone_m2 <= _LITTLE * d * d:
+        return True
+    wx = x - proxy.lx
+    wy = y - proxy.ly
+    wz = z - proxy.lz
+    near: bool = gone_m2 <= _PACE * _PACE * (wx * wx + wy * wy + wz * wz)
     return near
 
 
@@ -250,8 +250,8 @@ def hold_on(proxy: Any, others: Any, voxels: Any, x: float, y: float, z: float) 
     wy = proxy.gy
     wz = proxy.gz
     meet(proxy, others, voxels, gx, gy, gz)  # where it finds no surface, the goal stays where it is
-    slide(proxy, others, voxels, x, y, z, inf)
-    if proxy.depth_m > before_m:
+    slide(proxy, others, voxels, x, y, z, proxy.left_m)
+    if proxy.depth_m > before_m:  # by less than a micrometre, so that the normal of that face is right
         proxy.gx = wx
         proxy.gy = wy
         proxy.gz = wz

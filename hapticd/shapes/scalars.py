@@ -67,8 +67,8 @@ class ProxyScalars(ShapeScalars):
 
     Its state is in the solid's frame: `gx`, `gy`, `gz` the goal, where the proxy would be without friction, or the
     device while free; `ux`, `uy`, `uz` the normal there; `d` the distance that is free around it, or < 0 where the
-    device is let be in the solid; `lx`, `ly`, `lz` the device while touching; `sx`, `sy`, `sz` the proxy itself where
-    there is friction.
+    device is let be in the solid; `lx`, `ly`, `lz` the device while touching; `left_m` how far the goal might have
+    gone on then; `sx`, `sy`, `sz` the proxy itself where there is friction.
 
     A tick reads, in the world's frame:
         touching: whether the device is held.
@@ -102,6 +102,7 @@ class ProxyScalars(ShapeScalars):
     lx: float
     ly: float
     lz: float
+    left_m: float
     gx: float
     gy: float
     gz: float

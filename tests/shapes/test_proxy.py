@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -135,6 +136,45 @@ def test_past_the_centre_the_side_turns_no_faster_than_the_device_shakes(
         last, before = spring(proxy), p
         if tick < 100 * 2e-6 / noise_m:
             assert spring(proxy)[2] > 0.0, tick
+
+
+@pytest.mark.parametrize("more", [[], IN_A_UNION], ids=["alone", "in a union"])
+@pytest.mark.parametrize("way_m", [2e-5, 1e-4, 4e-4])
+@pytest.mark.parametrize("depths", [0.5, 1.2, 3.0])
+@pytest.mark.parametrize("name", ["rounded box", "rounded cylinder"])
+def test_drawn_over_a_rounded_edge_a_force_turns_no_faster_than_the_device_moves(
+    name: str, depths: float, way_m: float, more: list[Placed]
+) -> None:
+    """Held one and a half roundings deep, it had come round in one tick, by 24 times the device's way."""
+    edge = replace(CONVEX[name], pose=HERE)
+    half_x, half_z = (0.02, 0.01) if name == "rounded box" else (0.02, 0.015)
+    proxy = Proxy([edge, *more])
+    x, z = half_x - 2.0 * edge.rounding_m, half_z + 1e-3
+    stand(proxy, (x, 0.0, z))
+    while z > half_z - depths * edge.rounding_m:
+        z -= 1e-4
+        go(proxy, (x, 0.0, z))
+    last = spring(proxy)
+    while x < half_x - 1e-3:
+        x += way_m
+        go(proxy, (x, 0.0, z))
+        assert norm(minus(spring(proxy), last)) <= max(5.0 * way_m, 0.021 * norm(last)) + SURFACE_M
+        last = spring(proxy)
+    assert 1e-4 < proxy.depth_m < edge.rounding_m  # by then it has come round
+
+
+@pytest.mark.parametrize("name", CONVEX)
+@settings(max_examples=6, deadline=None)
+@given(seed=seeds, speed=speeds, pull=pulls)
+def test_while_a_device_is_held_its_force_turns_no_faster_than_it_moves(
+    name: str, seed: int, speed: float, pull: float
+) -> None:
+    last: Point | None = None
+    for now in walk(Proxy(SOLIDS[name]), seed, 300, speed, pull, reach_m=0.02):
+        if last is not None and now.proxy.touching:
+            bound = max(5.0 * norm(now.dp), 0.021 * norm(last)) + SURFACE_M
+            assert norm(minus(now.spring, last)) <= bound
+        last = now.spring
 
 
 @pytest.mark.parametrize("name", SOLIDS)
