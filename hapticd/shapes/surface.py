@@ -99,7 +99,7 @@ def land_in_union(
     if -SURFACE_M <= d <= SURFACE_M and buried(proxy, others, voxels, x, y, z, mx, my, mz):
         # between two shapes that are flush: what stands there is another face
         e, ox, oy, oz = ahead(proxy, others, voxels, gx, gy, gz, proxy.ux, proxy.uy, proxy.uz, inf)
-        if e < -SURFACE_M:
+        if e < -_BEYOND_M:
             return False, inf, x, y, z, mx, my, mz
     else:
         vx = x - gx
@@ -111,7 +111,7 @@ def land_in_union(
         ):
             return False, d, x, y, z, mx, my, mz
         e, ox, oy, oz = passed(proxy, others, voxels, tx, ty, tz, vx, vy, vz)
-        if e < -SURFACE_M:
+        if e < -_BEYOND_M:
             return False, d, x, y, z, mx, my, mz
     return True, 1.0, gx - e * ox, gy - e * oy, gz - e * oz, ox, oy, oz
 
@@ -215,13 +215,14 @@ def ahead(
         reach: what is further away does not count [m].
 
     Returns:
-        Less than `-SURFACE_M` where there is none.
+        Less than `-_BEYOND_M` where there is none; in one that is less deep the point is in the seam below it.
     """
     x += _BEYOND_M * nx
     y += _BEYOND_M * ny
     z += _BEYOND_M * nz
     d, mx, my, mz = shape_distance(proxy, voxels, x, y, z)
-    if d < -SURFACE_M or nx * mx + ny * my + nz * mz > _FACE:
+    turn = nx * mx + ny * my + nz * mz
+    if d < -_BEYOND_M or turn > _FACE or turn < _AGAINST:
         d = -1.0
     for at in range(proxy.first_part, proxy.end_part):
         part = others[at]
@@ -239,11 +240,12 @@ def ahead(
         qy = part.xy * bx + part.yy * by + part.zy * bz
         qz = part.xz * bx + part.yz * by + part.zz * bz
         e, qx, qy, qz = shape_distance(part, voxels, qx, qy, qz)
-        if e >= -SURFACE_M and (d < -SURFACE_M or e < d):
+        if e >= -_BEYOND_M and (d < -_BEYOND_M or e < d):
             bx = part.xx * qx + part.xy * qy + part.xz * qz
             by = part.yx * qx + part.yy * qy + part.yz * qz
             bz = part.zx * qx + part.zy * qy + part.zz * qz
-            if nx * bx + ny * by + nz * bz <= _FACE:
+            turn = nx * bx + ny * by + nz * bz
+            if _AGAINST <= turn <= _FACE:
                 d = e
                 mx = bx
                 my = by
@@ -268,7 +270,7 @@ def passed(
         z: see x.
 
     Returns:
-        Less than `-SURFACE_M` where none does, or the step has ended before it.
+        Less than `-_BEYOND_M` where none does, or the step has ended before it.
     """
     nx = proxy.ux
     ny = proxy.uy
@@ -285,7 +287,7 @@ def passed(
         d, mx, my, mz = ahead(
             proxy, others, voxels, gx + gone * tx, gy + gone * ty, gz + gone * tz, nx, ny, nz, length - gone
         )
-        if d < -SURFACE_M:
+        if d < -_BEYOND_M:
             break
         against = tx * mx + ty * my + tz * mz
         if d < SURFACE_M and against < 0.0:

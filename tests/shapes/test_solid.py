@@ -86,9 +86,13 @@ def test_a_corner_of_two_boxes_pushes_both_ways_and_no_harder() -> None:
     )
 
 
+@pytest.mark.parametrize("seed", [4, 12, 24, 45])
 @pytest.mark.parametrize("pose", [HERE, ASKEW], ids=["upright", "askew"])
-def test_the_notch_of_two_flush_boxes_lets_no_proxy_in_between_them(pose: Pose) -> None:
-    """One box stands on the other, half over its edge: where their faces lie against each other is no surface."""
+def test_the_notch_of_two_flush_boxes_lets_no_proxy_in_between_them(pose: Pose, seed: int) -> None:
+    """One box stands on the other, half over its edge: where their faces lie against each other is no surface.
+
+    Two or three micrometres in between them the goal was stuck, and held the hand back along the notch.
+    """
     size = (0.08, 0.08, 0.08)
     boxes = [
         Placed("box", Pose(pose.point(at), pose.rotation), size_m=size)
@@ -96,12 +100,14 @@ def test_the_notch_of_two_flush_boxes_lets_no_proxy_in_between_them(pose: Pose) 
     ]
     proxy = Proxy(boxes)
     stand(proxy, pose.point((0.001, 0.0, 0.001)))
-    draw = random.Random(4)
+    draw = random.Random(seed)
     x = z = 0.001
+    y = 0.0
     for _ in range(600):
         x = min(max(x + draw.gauss(0.0, 4e-4), -0.003), 0.002)
         z = min(max(z + draw.gauss(0.0, 4e-4), -0.003), 0.002)
-        go(proxy, pose.point((x, 0.0, z)))
+        y = 0.5 * y + draw.gauss(0.0, 2e-4)
+        go(proxy, pose.point((x, y, z)))
         free = pose.out((max(-x, 0.0), 0.0, max(-z, 0.0)))
         assert spring(proxy) == pytest.approx(free, abs=1e-5)
 
