@@ -192,6 +192,8 @@ class ControlLoop:
                 wait = self._waiting()
             if session.arming:
                 session.go_on_arming()
+            elif not driver.forces_flow and guard.mode is not disarmed:  # all of the force would be back at once
+                raise DeviceFaultError("it follows no more: see what took the force away, then arm")
             if session.stop_requested and not self._stopping:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))

@@ -181,6 +181,21 @@ def test_a_device_that_never_follows_is_the_fault_that_its_driver_makes_of_it(sl
     assert slow.codes[-1] == EventCode.DEVICE_FAULT
 
 
+def test_one_that_follows_no_more_while_armed_is_a_fault_and_gets_no_force_back(slow: Slow) -> None:
+    """All of 10 N was there again in one tick once it followed again, and was told of meanwhile."""
+
+    def lapse() -> None:
+        if len(slow.enabled) in (100, 110):
+            slow.driver.forces_flow = len(slow.enabled) == 110
+
+    slow.driver.before_read = lapse
+    with pytest.raises(DeviceFaultError, match="follows no more"):
+        slow.go()
+    assert len(slow.enabled) == 100
+    assert slow.tick.guard.latched
+    assert slow.driver.state is DriverState.CLOSED
+
+
 def test_a_law_that_cannot_start_when_it_follows_leaves_it_disarmed_and_says_why(
     slow: Slow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
