@@ -55,11 +55,12 @@ def disarm(
 ) -> None:
     """Ramp the force of a running daemon to zero.
 
-    Positions go on streaming.
+    Returns when the device has let go; where it may not have, the error says so: switch the device off. Positions go
+    on streaming.
 
     Example: hapticd disarm --instance left
     """
-    command("disarm", instance, connect=connect, keys=keys)
+    command("disarm", instance, connect=connect, keys=keys, wait=True)
 
 
 def clear(

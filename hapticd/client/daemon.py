@@ -106,8 +106,11 @@ class DaemonClient(Client):
         self._ask("arm")
 
     def disarm(self) -> None:
-        """Ramp the force to zero; positions go on streaming."""
-        self._ask("disarm")
+        """Ramp the force to zero; returns when the device has let go. Positions go on streaming.
+
+        Raises `RefusedError` where the force may still be there: switch the device off.
+        """
+        self._ask("disarm", wait=True)
 
     def calibrate(self) -> None:
         """Calibrate the device, which moves its arm by itself; the daemon must be disarmed.

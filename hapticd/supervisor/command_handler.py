@@ -46,7 +46,7 @@ class CommandHandler:
                 case "mark":
                     self._mark(request.get("text"), reply)
                 case "disarm":
-                    self.disarm(_answering(reply))
+                    self.disarm(_answering(reply), wait=bool(request.get("wait")))
                 case "arm" | "calibrate" | "tare" | "clear" as do if state.recovery.lost:
                     self._without_device(do, reply)
                 case "arm" | "calibrate" | "tare" | "clear" as do:
@@ -71,7 +71,7 @@ class CommandHandler:
         self.turn()
         self._state.requests.abandon("the daemon has stopped", force_left)
 
-    def disarm(self, answer: Answer | None = None) -> None:
+    def disarm(self, answer: Answer | None = None, *, wait: bool = False) -> None:
         """Have the loop let go; without a device see that the next one is not armed by itself.
 
         Who asks then hears of it once the force of the lost device has been looked after: it may only be silent.
@@ -79,7 +79,7 @@ class CommandHandler:
         state = self._state
         answer = answer or _unanswered
         if not state.recovery.lost:
-            state.requests.disarm(answer)
+            state.requests.disarm(answer, wait=wait)
             return
         state.recovery.amend(replace(state.recovery.resume, may_arm=False))
         state.arm_hold.follow_lost(state.loop, state.recovery.resume)

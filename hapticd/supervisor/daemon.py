@@ -256,7 +256,7 @@ class Daemon:
         self._reload.turn()
         for text in state.remote.turn():
             state.tell(EventCode.REMOTE_LOST, text)
-        state.requests.turn(state.loop.reader.fetched)
+        state.requests.turn(state.loop.reader.fetched, state.status.flags)
         state.event_log.turn(state.config, state.loop)
         if now_s >= state.status_due_s:
             self._look_after_lock()

@@ -19,11 +19,15 @@ from hapticd.loop.memory import (
     REQUESTS,
     SharedMemory,
 )
+from hapticd.tick.flags import Flag
 
 MOST_WAITING = 100
 
 EXPIRED = "not done, and it will not be: the loop was busy until the time for it had passed; ask again"
 """The answer to a request whose deadline has come while it waited."""
+
+ARMED_SINCE = "it was disarmed, and somebody has armed it again since"
+"""The answer to who waits for a device to let go that is armed again by then."""
 
 Answer = Callable[[str], None]
 """Called with "" when the loop has done it, else with why not."""
@@ -41,8 +45,10 @@ class RequestQueue:
         self._waiting: deque[_Waiting] = deque()
         self._posted: Answer | None = None
         self._calibrating = False
-        self._disarming: deque[tuple[int, Answer]] = deque()  # each by the number of its request
-        self._disarmed: deque[tuple[int, Answer]] = deque()  # each by the record that was the newest then
+        self._disarming: deque[tuple[int, Answer, bool]] = deque()  # each by the number of its request
+        self._disarmed: deque[tuple[int, Answer, bool]] = deque()  # each by the record that was the newest then
+        self._letting_go: list[Answer] = []  # until the device has let go
+        self._let_go_by = 0  # the record after which it has
         self._held: list[Answer] = []  # to disarm or stop, until it is known what became of the force
 
     def submit(self, request: dict[str, Any], answer: Answer, by_ns: int | None = None) -> None:
@@ -63,10 +69,15 @@ class RequestQueue:
         else:
             self._waiting.append(_Waiting(request, answer, by_ns))
 
-    def disarm(self, answer: Answer) -> None:
-        """Have the loop let go at its next tick; a calibration is called off, and what was to arm later does not."""
+    def disarm(self, answer: Answer, *, wait: bool = False) -> None:
+        """Have the loop let go at its next tick; a calibration is called off, and what was to arm later does not.
+
+        Args:
+            answer: called once that has begun.
+            wait: once the device has let go instead.
+        """
         self._shared.words[DISARM] += 1
-        self._disarming.append((self._shared.words[DISARM], answer))
+        self._disarming.append((self._shared.words[DISARM], answer, wait))
         waiting, self._waiting = self._waiting, deque()
         for one in waiting:
             if one.request["do"] in ("arm", "calibrate"):
@@ -74,20 +85,28 @@ class RequestQueue:
             else:
                 self._waiting.append(one)
 
-    def turn(self, fetched: int) -> None:
+    def turn(self, fetched: int, flags: int = 0) -> None:
         """Hand out the answers that have come, and send the next request.
 
         An answer waits for the first record after it, so that the asker finds what was done in the status.
 
         Args:
             fetched: tick records of this loop that were fetched so far.
+            flags: of the newest of them.
         """
         words = self._shared.words
         self._drop_expired(time.monotonic_ns())
         while self._disarmed and fetched > self._disarmed[0][0]:
-            self._disarmed.popleft()[1]("")
+            _, asker, waits = self._disarmed.popleft()
+            if waits:
+                self._letting_go.append(asker)
+                self._let_go_by = words[RECORDS] + 1
+            else:
+                asker("")
         while self._disarming and self._disarming[0][0] <= words[DISARMED]:
-            self._disarmed.append((words[RECORDS], self._disarming.popleft()[1]))
+            self._disarmed.append((words[RECORDS], *self._disarming.popleft()[1:]))
+        if self._letting_go:
+            self._turn_letting_go(fetched, flags)
         if self._posted is not None:
             if words[ANSWERED] != words[REQUESTS] or fetched <= words[ANSWERED_AT]:
                 return
@@ -108,6 +127,15 @@ class RequestQueue:
                     for other in waiting:
                         self.submit(other.request, other.answer)
 
+    def _turn_letting_go(self, fetched: int, flags: int) -> None:
+        """A device is told to let go after the first record without a force: the next one says that it has."""
+        if flags & Flag.RELEASING:
+            self._let_go_by = self._shared.words[RECORDS] + 1
+        elif flags & Flag.ARMED or fetched > self._let_go_by:
+            askers, self._letting_go = self._letting_go, []
+            for asker in askers:
+                asker(ARMED_SINCE if flags & Flag.ARMED else "")
+
     def abandon(self, why: str, force_left: str | None = "") -> None:
         """Answer all that wait: the loop is gone; who asked to disarm or stop asks for its force, and hears of that.
 
@@ -115,7 +143,7 @@ class RequestQueue:
             why: the answer to all others.
             force_left: why the force may still be there; "" when it is gone, None: to be told by `settle`.
         """
-        self._held += [answer for _, answer in (*self._disarmed, *self._disarming)]
+        self._held += [answer for _, answer, _ in (*self._disarmed, *self._disarming)] + self._letting_go
         answers = [one.answer for one in self._waiting]
         if self._posted is not None:
             if self._shared.words[ANSWERED] == self._shared.words[REQUESTS]:
@@ -126,6 +154,7 @@ class RequestQueue:
         self._calibrating = False
         self._disarmed.clear()
         self._disarming.clear()
+        self._letting_go = []
         self._waiting.clear()
         for answer in answers:
             answer(why)

@@ -268,6 +268,27 @@ def test_a_device_that_nobody_can_find_again_is_not_called_one_without_force() -
 
 
 @anew_where_late
+def test_who_disarms_a_device_that_does_not_let_go_hears_of_it() -> None:
+    """`hapticd disarm` was content when the ramp began, and a 204 told of it afterwards."""
+    with Rig() as rig:
+        rig.pressed()
+        rig.order("keeps")
+        said = rig.hapticd("disarm")
+        assert said.returncode == 1
+        assert "the force may still be there" in said.stderr
+
+
+@anew_where_late
+def test_who_disarms_a_device_that_lets_go_waits_for_that_and_no_longer() -> None:
+    with Rig(safety="ramp_s = 0.5") as rig:
+        rig.pressed()
+        rig.order("")
+        assert rig.hapticd("disarm").returncode == 0
+        assert rig.felt().force_n == 0.0
+        assert rig.hapticd("disarm").returncode == 0, "it is disarmed already"
+
+
+@anew_where_late
 def test_who_stops_a_daemon_whose_lost_loop_hangs_hears_what_became_of_the_force() -> None:
     with Rig() as rig, rig.pressed().subscriber() as subscriber:
         rig.order("hang-disable")

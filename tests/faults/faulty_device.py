@@ -103,6 +103,8 @@ class Faulty(Loopback):
         self._applied(force_n[0], 1)
 
     def _disable(self) -> None:
+        if self._order == "keeps":  # whoever asks
+            raise OSError(5, "Input/output error")
         if self._order in SILENT and Path(sys.argv[0]).stem == "process":
             time.sleep(HANG_S * (self._order == "hang-disable"))
             raise OSError(5, "Input/output error")

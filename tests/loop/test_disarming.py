@@ -10,8 +10,9 @@ import pytest
 from hapticd.config.loading import parse
 from hapticd.errors import DeviceTimeoutError, DriverStateError
 from hapticd.loop.memory import DISARM, DISARMED, DISARMED_SINCE, RECORDS, SharedMemory
-from hapticd.supervisor.request_queue import Answer, RequestQueue
+from hapticd.supervisor.request_queue import ARMED_SINCE, Answer, RequestQueue
 from hapticd.tick.event import EventCode
+from hapticd.tick.flags import Flag
 from hapticd.tick.record import RecordLayout
 from tests.loop.bench import Bench
 
@@ -76,6 +77,23 @@ class TestInTheQueue:
         assert answers == []
         requests.turn(9)
         assert answers == ["disarm: done"]
+
+    @pytest.mark.parametrize(
+        ("flags", "answer"), [(0, "disarm: done"), (Flag.ARMED, f"disarm: {ARMED_SINCE}")], ids=["gone", "armed anew"]
+    )
+    def test_who_waits_for_the_device_to_let_go_hears_when_it_has(
+        self, shared: SharedMemory, flags: int, answer: str
+    ) -> None:
+        requests, answers = RequestQueue(shared), Answers()
+        requests.disarm(answers.to("disarm"), wait=True)
+        loop_disarms(shared)
+        for record in range(1, 9):
+            requests.turn(record, Flag.RELEASING)
+            shared.words[RECORDS] = record + 1
+        assert answers == []
+        for record in range(9, 12):
+            requests.turn(record, flags)
+        assert answers == [answer]
 
     def test_one_who_asks_again_and_again_keeps_no_answer_away(self, shared: SharedMemory) -> None:
         """In each turn it has asked once more than the loop has done."""
