@@ -41,4 +41,7 @@ def stopped_text(mode: int, fault: int, silence_ms: float) -> str:
         return f"its watchdog heard no command for {silence_ms:g} ms"
     if mode == STOPPED:
         return "it has stopped, as when it was switched off and on, or another program told it to"
-    return f"it is in mode {mode}: another program on the bus commands it"
+    return (
+        f"it is in mode {mode} and follows no torque: look at its motor supply and its firmware's settings, and for "
+        "another program on the bus that commands it"
+    )
