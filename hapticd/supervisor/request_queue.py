@@ -99,8 +99,9 @@ class RequestQueue:
         while self._disarmed and fetched > self._disarmed[0][0]:
             _, asker, waits = self._disarmed.popleft()
             if waits:
+                if not self._letting_go:  # who asks again and again puts nobody off
+                    self._let_go_by = words[RECORDS] + 1
                 self._letting_go.append(asker)
-                self._let_go_by = words[RECORDS] + 1
             else:
                 asker("")
         while self._disarming and self._disarming[0][0] <= words[DISARMED]:
@@ -173,7 +174,7 @@ class RequestQueue:
         """
         held, self._held = self._held, []
         for answer in held:
-            answer(f"the force may still be there: {force_left}" if force_left else "")
+            answer(f"the force may still be there: {force_left}; switch the device off" if force_left else "")
 
     def _drop_expired(self, now_ns: int) -> None:
         """Answer what has waited for too long, at once: who asked is about to stop listening."""

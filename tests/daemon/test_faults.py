@@ -262,7 +262,7 @@ def test_a_device_that_nobody_can_find_again_is_not_called_one_without_force() -
         os.kill(rig.daemon.control_pid(), signal.SIGSTOP)
         answer = rig.ask("disarm")
         why = "the device could not be opened: found faulty 2 (x) instead of faulty 1 (x)"
-        assert answer == {"ok": False, "text": f"the force may still be there: {why}"}
+        assert answer == {"ok": False, "text": f"the force may still be there: {why}; switch the device off"}
         assert str(events_until(subscriber, EventCode.CONTROL_LOST)[-1]["text"]).endswith(f"; {why}")
         assert rig.daemon.wait_exit() == 1
 
@@ -295,7 +295,7 @@ def test_who_stops_a_daemon_whose_lost_loop_hangs_hears_what_became_of_the_force
         events_until(subscriber, EventCode.DEVICE_LOST)
         rig.order("swapped")  # for whoever opens it from now on
         why = "the device could not be opened: found faulty 2 (x) instead of faulty 1 (x)"
-        assert rig.ask("stop") == {"ok": False, "text": f"the force may still be there: {why}"}
+        assert rig.ask("stop") == {"ok": False, "text": f"the force may still be there: {why}; switch the device off"}
         assert why in rig.daemon.output()
         assert rig.daemon.wait_exit() == 1
 

@@ -184,7 +184,7 @@ def test_who_disarms_a_device_that_is_lost_hears_once_it_is_known_what_became_of
     assert not made.resume.may_arm
     stalled.append(True)
     turn()
-    said = f"the force may still be there: {left}" if left else ""
+    said = f"the force may still be there: {left}; switch the device off" if left else ""
     assert verdicts == [said] * 2
     asked.append(({"do": "disarm"}, lambda _ok, verdict: verdicts.append(verdict), "a test"))
     turn()
