@@ -58,7 +58,7 @@ def simulate(
     tick, the first at t = 0:
 
     t_s, x_m, v_m_per_s (both true), x_measured_m, force_n (applied), force_requested_n, energy_j (into the walls),
-    cycle, damping_n_s_per_m, in_contact
+    cycle, damping_n_s_per_m, in_contact, armed (0 from a fault on, which ramps the force out)
 
     x is relative to the first wall and negative inside it; a positive force pushes out. A device with several axes has
     more columns: position, velocity, measured position and force along each, the object that is touched, and its depth;

@@ -34,7 +34,7 @@ LONGEST_S = 1e9
 _CHUNK_TICKS = 2000
 """Ticks that are collected at once; progress hears as often."""
 
-_CODES = {"cycle": "q", "in_contact": "b", "touched": "q"}
+_CODES = {"cycle": "q", "in_contact": "b", "armed": "b", "touched": "q"}
 """Type codes of the columns that hold no floats."""
 
 MakeRows = Callable[["Rehearsal", int, int], Iterator["Row | SpaceRow"]]
@@ -236,6 +236,7 @@ def _rows(rehearsal: Rehearsal, ticks: int, period_ns: int) -> Iterator[Row]:
             first.ledger.cycle if first else 0,
             first.damping_n_s_per_m if first else 0.0,
             int(first.in_contact) if first else 0,
+            int(tick.guard.mode is Mode.ARMED),
         )
 
 
@@ -269,6 +270,7 @@ def _rows_in_space(rehearsal: Rehearsal, ticks: int, period_ns: int) -> Iterator
             shown.ledger.cycle if shown else 0,
             shown.damping_n_s_per_m if shown else 0.0,
             int(shown.in_contact) if shown else 0,
+            int(tick.guard.mode is Mode.ARMED),
             *position,
             *velocity,
             *measured,

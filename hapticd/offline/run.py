@@ -38,6 +38,7 @@ class Row(NamedTuple):
         cycle: completed energy cycles of the first wall.
         damping_n_s_per_m: damping of the law on the first wall; 0 when it has none.
         in_contact: 1 inside the first wall, else 0.
+        armed: 1 while forces are let through, 0 while a fault has them ramped out, and after.
     """
 
     t_s: float
@@ -50,6 +51,7 @@ class Row(NamedTuple):
     cycle: int
     damping_n_s_per_m: float
     in_contact: int
+    armed: int
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -95,6 +97,7 @@ class Run:
     cycle = Column("completed energy cycles of the first wall")
     damping_n_s_per_m = Column("damping of the law on the first wall; 0 when it has none [N s/m]")
     in_contact = Column("whether the device is inside the first wall")
+    armed = Column("whether forces are let through: not from a fault on")
 
     @property
     def period_s(self) -> float:

@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 
 class SpaceRow(NamedTuple):
-    """One tick of a device with two or three axes; the first ten columns are those of one axis.
+    """One tick of a device with two or three axes; the first eleven columns are those of one axis.
 
     Without a wall x_m and x_measured_m are less the depth in the object that is touched deepest, v_m_per_s is along its
     normal, and the forces are magnitudes.
 
     Attributes:
         t_s: time since the first tick [s].
-        x_m, v_m_per_s, x_measured_m, force_n, force_requested_n, energy_j, cycle, damping_n_s_per_m, in_contact: as
-            `hapticd.offline.run.Row` has them.
+        x_m, v_m_per_s, x_measured_m, force_n, force_requested_n, energy_j, cycle, damping_n_s_per_m, in_contact,
+            armed: as `hapticd.offline.run.Row` has them.
         position_x_m, position_y_m, position_z_m: true position in the scene [m].
         velocity_x_m_per_s, velocity_y_m_per_s, velocity_z_m_per_s: true velocity [m/s].
         measured_x_m, measured_y_m, measured_z_m: position as the device reports it [m].
@@ -35,6 +35,7 @@ class SpaceRow(NamedTuple):
     cycle: int
     damping_n_s_per_m: float
     in_contact: int
+    armed: int
     position_x_m: float
     position_y_m: float
     position_z_m: float

@@ -18,11 +18,11 @@ from hapticd.offline.run import Row
 from hapticd.offline.space_row import SpaceRow
 from hapticd.replacing import place, put
 
-CSV_ROW_BYTES = 130
-"""About what a row of a CSV file takes: ten numbers, most with all their digits."""
+CSV_ROW_BYTES = 132
+"""About what a row of a CSV file takes: eleven numbers, most with all their digits."""
 
-NPZ_ROW_BYTES = 73
-"""Eight floats, a count and a byte."""
+NPZ_ROW_BYTES = 74
+"""Eight floats, a count and two bytes."""
 
 _SUFFIXES = {".csv": CSV_ROW_BYTES, ".npz": NPZ_ROW_BYTES}
 
@@ -100,7 +100,7 @@ class NpzTrace(TraceFile):
         import numpy as np
 
         self._np = np
-        kinds: dict[str, Any] = {"cycle": np.int64, "in_contact": np.bool_, "touched": np.int64}
+        kinds: dict[str, Any] = {"cycle": np.int64, "in_contact": np.bool_, "armed": np.bool_, "touched": np.int64}
         self._columns = {name: np.empty(rows, kinds.get(name, np.float64)) for name in names}
         self._arrays = tuple(self._columns.values())
         self._count = 0

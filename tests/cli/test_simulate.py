@@ -63,13 +63,41 @@ def rows(config: Path, duration_s: float) -> list[Row]:
 # -- the numbers
 
 
+SPACE = """
+    axes = 3
+    space.hand.force = { profile = "constant", newton = [0.0, 0.0, -5.0] }
+    [[scene.objects]]
+    name = "floor"
+    shape = "plane"
+    stiffness_n_per_m = 2000.0
+    """
+WALLS = """
+    hand.force = { profile = "constant", newton = -5.0 }
+    [[scene.walls]]
+    stiffness_n_per_m = 2000.0
+    """
+
+
+@pytest.mark.parametrize("scene", [WALLS, SPACE])
+def test_a_run_tells_from_which_tick_on_a_fault_takes_the_force_away(scene: str) -> None:
+    """Else the handle that is pushed out for good looks like one that was let go."""
+    fast = f"[safety]\nmax_speed_m_per_s = 0.01\n[device.options]\n{scene}\n"
+    run = run_offline(parse(fast, "fast.toml"), 1.0)
+    assert run.fault is not None
+    armed = run.columns["armed"]
+    assert armed[0] == 1
+    assert armed[-1] == 0
+    assert list(armed) == sorted(armed, reverse=True)
+    assert all(force_n == 0.0 for force_n in list(run.columns["force_n"])[list(armed).index(0) + 60 :])
+
+
 def test_a_run_has_one_row_a_tick_from_zero_with_the_documented_columns(tmp_path: Path) -> None:
     output = tmp_path / "run.csv"
     done = simulate("--config", WALL_12, "--duration", "0.25", "--output", output)
     assert (done.returncode, done.stderr) == (0, "")
     header = output.read_text().splitlines()[0]
     assert header == (
-        "t_s,x_m,v_m_per_s,x_measured_m,force_n,force_requested_n,energy_j,cycle,damping_n_s_per_m,in_contact"
+        "t_s,x_m,v_m_per_s,x_measured_m,force_n,force_requested_n,energy_j,cycle,damping_n_s_per_m,in_contact,armed"
     )
     run = rows_of(output)
     assert [row["t_s"] for row in run] == [count / 1000 for count in range(250)]
@@ -102,11 +130,12 @@ def test_the_numbers_are_the_daemons_to_the_last_bit() -> None:
         assert row.x_measured_m == -(record.position_m[0] - 0.03), seq
         assert row.force_n == -record.force_n[0], seq
         assert row.force_requested_n == -record.force_requested_n[0], seq
-        assert (row.energy_j, row.cycle, row.damping_n_s_per_m, row.in_contact) == (
+        assert (row.energy_j, row.cycle, row.damping_n_s_per_m, row.in_contact, row.armed) == (
             record.energy_j,
             wall.cycle,
             wall.damping_n_s_per_m,
             wall.in_contact,
+            True,
         ), seq
 
 
@@ -171,7 +200,7 @@ def test_the_summary_is_what_the_rows_say(tmp_path: Path) -> None:
         (["-d", "1", "-o", "nowhere/run.csv"], "nowhere/run.csv: there is no directory nowhere"),
         (["-d", "1", "-o", "old.csv"], "old.csv: exists; add --overwrite to replace it"),
         (["-d", "1e9", "-o", "run.npz"], "run.npz: 1000000000000 ticks take 73 TB of memory and"),
-        (["-d", "1e9", "-o", "run.csv"], "run.csv: 1000000000000 ticks take about 130 TB and"),
+        (["-d", "1e9", "-o", "run.csv"], "run.csv: 1000000000000 ticks take about 132 TB and"),
     ],
 )
 def test_what_cannot_be_is_said_before_any_work(

@@ -199,7 +199,7 @@ def test_without_the_study_extra_columns_are_plain_and_a_plot_says_what_to_insta
 
 def test_columns_by_name_are_plain_arrays_that_a_run_without_numpy_has_too(settled: Run) -> None:
     kinds: dict[str, Any] = {name: column.typecode for name, column in settled.columns.items()}
-    assert kinds == {name: {"cycle": "q", "in_contact": "b"}.get(name, "d") for name in Row._fields}
+    assert kinds == {name: {"cycle": "q", "in_contact": "b", "armed": "b"}.get(name, "d") for name in Row._fields}
     assert all(isinstance(column, array) for column in settled.columns.values())
 
 
