@@ -60,14 +60,16 @@ class State:
     damping_n_s_per_m: float  # injected at the last tick
     speed_m_per_s: float  # at the last tick, for the printed observer
     reference_j: float  # at the last tick; what is missing from it is the debt
+    start_m: float  # where it took over, until the first sample tells how stiff the spring is that is pressed there
 
 
 def start(state: Any, params: Any, snapshot: Any) -> None:
-    """Take over: a debt is carried over, a credit is not."""
+    """Take over: a debt is carried over, of a credit only what a pressed spring holds."""
     state.energy_j = min(0.0, -_bounded(snapshot.debt_j))
     state.damping_n_s_per_m = 0.0
     state.speed_m_per_s = 0.0
     state.reference_j = 0.0
+    state.start_m = snapshot.x_m
 
 
 def step(state: Any, params: Any, tick: Any) -> float:
@@ -75,6 +77,8 @@ def step(state: Any, params: Any, tick: Any) -> float:
     velocity = tick.velocity_m_per_s
     if not params.carry_debt and state.energy_j < state.reference_j:
         state.energy_j = state.reference_j
+    if state.start_m != 0.0:
+        _begin_inside(state, tick)
     if params.observer == OBSERVER_EXACT:
         flow_j = -tick.applied_n * tick.moved_m  # E(n) = E(n-1) - F(n-1) (x(n) - x(n-1))
     else:  # W(n) = W(n-1) + f(n) v(n) + alpha(n-1) v(n-1)^2
@@ -100,6 +104,14 @@ def step(state: Any, params: Any, tick: Any) -> float:
         state.damping_n_s_per_m = damping
         force_n -= damping * velocity
     return force_n
+
+
+def _begin_inside(state: Any, tick: Any) -> None:
+    """At the first sample: E(0) is what the spring held at the start, else its return would be a debt."""
+    start_m = state.start_m
+    state.start_m = 0.0
+    if tick.in_contact and start_m * tick.x_m > 0.0:
+        state.energy_j += _bounded(0.5 * abs(tick.spring_n * start_m) * abs(start_m / tick.x_m))
 
 
 def _bounded(value: float) -> float:

@@ -79,7 +79,7 @@ class EnergyLedger:
         stored_j: energy in the spring now [J].
         dissipated_j: energy taken by wall damping, law and ramps [J]; falls while they are active.
         generated_j: energy made by sampling and hold [J], never falls.
-        debt_j: what this contact has given beyond what it took since it was touched [J], >= 0.
+        debt_j: what this contact has given since it was touched beyond what it took, and held when armed [J], >= 0.
         cycle: completed cycles, by the 2+2 window whatever the law uses.
         cycle_energy_j, cycle_generated_j, cycle_damping_n_s_per_m: of the last completed cycle.
         cycle_duration_s: how long it took, from the touch or the end of the cycle before [s].
@@ -124,8 +124,16 @@ class EnergyLedger:
 
     @property
     def debt_j(self) -> float:
-        """What this contact has given beyond what it took since it was touched [J], >= 0."""
+        """What this contact has given since it was touched beyond what it took, and held when armed [J], >= 0."""
         return max(0.0, -self._touch_j)
+
+    def arm(self, stored_j: float) -> None:
+        """Take what a spring holds that is pressed when forces are let in: no hand gave it, and its return is no debt.
+
+        Args:
+            stored_j: energy in the spring once its force is there [J].
+        """
+        self._touch_j = min(self._touch_j - self.stored_j, 0.0) + stored_j
 
     def update(
         self,

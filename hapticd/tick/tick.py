@@ -257,6 +257,7 @@ class ControlTick:
         self.guard.arm()
         self.fallback = False
         self.just_armed = True
+        self._arm_books()
         for contact, law in laws:
             self._take_law(contact, law)
         for contact in self._fading_out():
@@ -471,6 +472,12 @@ class ControlTick:
         self._active = [*self.contacts, *self.leaving, *self.own_ports.axes]
         self.ports = list(self.couplings)
         self.has_ports = self.has_ports or bool(self.ports)  # and their books once they are gone
+
+    def _arm_books(self) -> None:
+        """Tell the books what springs hold that are pressed by now."""
+        for contact in self.contacts:
+            if contact.in_contact:
+                contact.ledger.arm(contact.wall.stored_j(contact.x_m, self.guard.limit_n))
 
     def _under_law(self) -> list[Contact]:
         return self.contacts  # all that have a law of [controller]

@@ -1,4 +1,4 @@
-"""The energy-cycle law where it starts in a wall that is pressed: what the spring gives back is no gain."""
+"""Laws that start in a wall that is pressed: what the spring gives back is no gain and no debt."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from hapticd.law import LawSnapshot, LawTick, fresh_state, plain_object, scalar_params
-from hapticd_controllers import energy_cycle, ring_damping
+from hapticd_controllers import energy_cycle, none, ring_damping, tdpa
 from hapticd_controllers.energy_cycle import Params
 from tests.tick.rig import Rig, running, wall
 
@@ -83,3 +83,57 @@ def test_a_device_that_has_come_in_since_found_a_spring_that_held_nothing(start_
 def test_a_touch_that_was_there_at_the_start_is_no_new_one(start_m: float, kept: float) -> None:
     state = first(-1e-3, start_m, new_contact="damping")
     assert state.damping_n_s_per_m == kept
+
+
+def swallowed_j(rig: Rig, ticks: int = 30) -> float:
+    """What a hand does not get back of the spring that retreats from 1.5 mm, after the ramps."""
+    rig.force(START_M, ticks=200)
+    swallowed_j = 0.0
+    for n in range(ticks):
+        x_m = START_M * (1.0 - (n + 1) / ticks)
+        pulled_n = -STIFFNESS_N_PER_M * x_m - rig.force(x_m)
+        swallowed_j -= pulled_n * START_M / ticks
+    return swallowed_j
+
+
+@pytest.mark.parametrize("switched", [False, True])
+def test_passivity_control_that_starts_in_a_pressed_wall_takes_no_more_than_one_that_came_free(switched: bool) -> None:
+    """Of 5.6 mJ it swallowed 4.0: the spring's return was a debt."""
+    rig = pressed(none if switched else tdpa, arm=switched)
+    if switched:
+        rig.switch(make_law=running(tdpa))
+    else:
+        assert rig.tick.arm()
+    assert swallowed_j(rig) <= swallowed_j(pressed(tdpa))
+
+
+def retreated(ticks: int) -> Rig:
+    """A hand that was in the wall when the device was armed, and has come back by 1.4 mm of 1.5."""
+    rig = pressed(none, arm=False)
+    assert rig.tick.arm()
+    rig.force(START_M, ticks=200)
+    for n in range(ticks):
+        rig.force(START_M + 1.4e-3 * (n + 1) / ticks)
+    return rig
+
+
+def test_what_the_ramp_put_into_a_spring_is_no_debt_of_who_retreats() -> None:
+    """It was 5.1 mJ, all that the spring gave back."""
+    rig = retreated(200)
+    leaked_j = 200 * 0.5 * STIFFNESS_N_PER_M * 7e-6**2
+    assert rig.tick.contacts[0].ledger.debt_j <= leaked_j
+
+
+def test_armed_again_the_spring_counts_once() -> None:
+    rig = retreated(200)
+    for _ in range(3):
+        rig.force(START_M)
+        rig.tick.release(0.0)
+        rig.force(START_M, ticks=5)
+        assert rig.tick.arm()
+        rig.force(START_M, ticks=100)
+    contact = rig.tick.contacts[0]
+    before_j = contact.ledger.energy_j
+    rig.force(-1e-6)
+    given_j = before_j - contact.ledger.energy_j
+    assert contact.ledger.debt_j == pytest.approx(given_j - STORED_J, rel=1e-6)

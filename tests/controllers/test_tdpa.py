@@ -212,8 +212,11 @@ def test_the_cap_is_the_most_that_is_injected_and_0_is_none(cap_n_s_per_m: float
 
 
 @pytest.mark.parametrize("carry_debt", [False, True])
-def test_a_law_that_takes_over_begins_without_credit(carry_debt: bool) -> None:
+@pytest.mark.parametrize("start_m", [-1e-3, 0.0, 1e-3])
+def test_a_law_that_takes_over_begins_with_what_a_pressed_spring_holds(carry_debt: bool, start_m: float) -> None:
     state, params = fresh_state(tdpa), plain_object("Params", scalar_params(Params(carry_debt=carry_debt)))
-    tdpa.start(state, params, LawSnapshot(x_m=-1e-3, debt_j=2e-3))
-    tdpa.step(state, params, LawTick(x_m=-1e-3, in_contact=True, contact_n=4.0, spring_n=4.0))
-    assert state.energy_j == (-2e-3 if carry_debt else 0.0)
+    tdpa.start(state, params, LawSnapshot(x_m=start_m, debt_j=5e-3))
+    held_j = 2e-3 if start_m < 0.0 else 0.0
+    for _ in range(2):
+        tdpa.step(state, params, LawTick(x_m=-1e-3, in_contact=True, contact_n=4.0, spring_n=4.0))
+        assert state.energy_j == pytest.approx(held_j - 5e-3 if carry_debt else held_j, abs=1e-15)

@@ -18,7 +18,7 @@ from hapticd.tick.event import EventCode
 from hapticd.tick.guard import Guard, Mode
 from hapticd.tick.remote.tick_ports import MakePort
 from hapticd.tick.space.books import SpaceBooks, Totals
-from hapticd.tick.space.channel import share_debt
+from hapticd.tick.space.channel import share_debt, stretched_m
 from hapticd.tick.space.solid import Solid, astray, at_once, compile_objects
 from hapticd.tick.space.solid_contact import SolidContact
 from hapticd.tick.space.switch import SpaceSwitch, holding
@@ -257,6 +257,11 @@ class SpaceTick(ControlTick):
             self._drop_faded()
         return force_n
 
+    def _arm_books(self) -> None:
+        super()._arm_books()
+        for contact in [each for each in self.solids if each.depth_m > 0.0]:
+            contact.ledger.arm(contact.solid.stored_j(stretched_m(contact.solid.proxy), self.guard.limit_n))
+
     def _under_law(self) -> list[Contact]:
         return [*self.contacts, *(channel for contact in self.solids for channel in contact.channels)]
 
@@ -278,9 +283,8 @@ class SpaceTick(ControlTick):
 
     def _blend_all(self) -> None:
         super()._blend_all()
-        for contact in (*self.solids, *self.fading):
-            for channel in contact.channels:
-                self._blend(channel)
+        for channel in [each for contact in (*self.solids, *self.fading) for each in contact.channels]:
+            self._blend(channel)
 
     def _contact(self, solid: Solid, make_law: Callable[[], RunningLaw], limits: Limits) -> SolidContact:
         if solid.remote:
