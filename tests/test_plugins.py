@@ -51,6 +51,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, **points: str) -> None:
         for group in (plugins.DRIVERS, plugins.CONTROLLERS)
     ]
     monkeypatch.setattr(plugins, "entry_points", lambda **which: EntryPoints(found).select(**which))
+    monkeypatch.setattr(plugins, "_found", {})
 
 
 @pytest.mark.parametrize(
@@ -99,6 +100,18 @@ def test_every_shipped_law_keeps_the_contract_and_every_driver_loads() -> None:
         assert isinstance(plugins.law(name), ModuleType)
     for name in plugins.names(plugins.DRIVERS):
         assert issubclass(plugins.driver(name), Driver)
+
+
+def test_what_was_found_is_not_looked_for_again_and_what_was_not_found_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Studies ask for a law thousands of times; a law may be installed while a daemon runs."""
+    installed(monkeypatch, swift="hapticd_controllers.none")
+    law = plugins.law("swift")
+    with pytest.raises(PluginError, match="no law 'late'"):
+        plugins.law("late")
+    late = EntryPoint("late", "hapticd_controllers.tdpa", plugins.CONTROLLERS)
+    monkeypatch.setattr(plugins, "entry_points", lambda **which: EntryPoints([late]).select(**which))
+    assert plugins.law("swift") is law
+    assert plugins.law("late").__name__ == "hapticd_controllers.tdpa"
 
 
 def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:

@@ -197,7 +197,7 @@ def swap(file: Path, before: str) -> None:
     was, now = (compile(text, str(file), "exec") for text in (before, file.read_text()))
     places = dict(_codes(now))
     others = {(code.co_qualname, code.co_firstlineno): places.get(place) for place, code in _codes(was)}
-    for function in [each for each in gc.get_objects() if isinstance(each, FunctionType)]:
+    for function in [each for each in gc.get_objects() if type(each) is FunctionType]:  # a dead proxy has no class
         code = function.__code__
         if code.co_filename == str(file):
             other = others.get((code.co_qualname, code.co_firstlineno))
