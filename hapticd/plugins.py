@@ -32,6 +32,11 @@ def names(group: str) -> list[str]:
     return sorted({point.name for point in entry_points(group=group)})
 
 
+def is_installed(group: str, name: str) -> bool:
+    """Whether an entry-point group has a name, without the look through all of them that `names` takes."""
+    return _find(group, name) is not None
+
+
 def driver(name: str) -> type[Driver[Any]]:
     """The driver class installed under a name, or one of an importable module.
 

@@ -271,14 +271,14 @@ def _plugin(
     name = table.get(key[1], default) if isinstance(table, dict) else None
     if not isinstance(name, str) or not name:  # already reported
         return None
-    installed = plugins.names(group)
-    if name not in installed and "." not in name:
-        own = "a module of your own is named package.module"
-        problems.add(key, f"not installed; {own}; {nearest(name, installed)}", name)
-        return None
-    if name not in installed and not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)+", name):
-        problems.add(key, f"must be the dotted name of a Python module, such as mylab.{key[1]}s", name)
-        return None
+    if not plugins.is_installed(group, name):
+        if "." not in name:
+            own = "a module of your own is named package.module"
+            problems.add(key, f"not installed; {own}; {nearest(name, plugins.names(group))}", name)
+            return None
+        if not re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)+", name):
+            problems.add(key, f"must be the dotted name of a Python module, such as mylab.{key[1]}s", name)
+            return None
     try:
         return find(name)
     except PluginError as error:

@@ -23,7 +23,7 @@ def test_with_an_object_out_of_reach_walls_are_as_without_any(law: str, info: De
         rig = Rig(WALLS + object_, law, SAFETY, info)
         changes: dict[int, Act] = {220: switched(OTHERS + object_)}
         changes[650] = switched(WALLS + object_, "damper")
-        runs.append(go_through(rig, of_walls, ACTS | changes))
+        runs.append(go_through(rig, of_walls, ACTS | changes, seed=5))  # of few others a wall that is pressed has debts
         assert (rig.tick.advance == rig.tick.step) is not bool(object_)
     without, beside = runs
     assert beside == without
