@@ -7,6 +7,7 @@ import random
 import struct
 import typing
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar, Literal
 
@@ -92,7 +93,7 @@ class LawContract:
             for _ in range(50):
                 snapshot = _snapshot(draw)
                 state = _started(module, params, snapshot)
-                _check_state(module, state, f"{params!r} started from {snapshot}")
+                _check_state(module, state, _Place(params, snapshot))
 
     @pytest.mark.parametrize("seed", SEEDS)
     def test_finite_ticks_give_a_finite_force_and_a_state_of_numbers(
@@ -107,7 +108,7 @@ class LawContract:
                 plain = plain_object("Params", scalar_params(params))
                 ticks = _ticks(draw)
                 for at, tick in enumerate(3 * ticks):
-                    where = f"{params!r} started from {snapshot}, then at tick {at}: {tick}"
+                    where = _Place(params, snapshot, at, tick)
                     _check_number(_stepped(module, state, plain, tick, where), where)
                     _check_state(module, state, where)
 
@@ -143,9 +144,9 @@ class LawContract:
                     force_n = module.step(always, plain, tick)
                     if tick.in_contact or awake:
                         asked = True
-                        where = f"{params!r} started from {snapshot}, then at tick {at}: {tick}"
+                        where = _Place(params, snapshot, at, tick)
                         answer_n = module.step(rested, plain, tick)
-                        assert not tick.in_contact or answer_n == force_n, where
+                        assert not tick.in_contact or answer_n == force_n, f"{where}"
                         awake = tick.in_contact or applied_n != 0.0
                     for name in _SHOWN if asked else ():
                         assert getattr(rested, name, 0.0) == getattr(always, name, 0.0), f"State.{name}: {where}"
@@ -167,11 +168,25 @@ class LawContract:
                 for at, tick in enumerate(make(draw)):
                     tick.applied_n = tick.applied_contact_n = applied_n
                     force_n = module.step(state, plain, tick)
-                    where = f"{params!r} started from {snapshot}, then at tick {at}: {tick}"
-                    assert machine.step(tick) == force_n, where
+                    where = _Place(params, snapshot, at, tick)
+                    assert machine.step(tick) == force_n, f"{where}"
                     for name in state_fields(module):
                         assert machine.state[name] == getattr(state, name), f"State.{name}: {where}"
                     applied_n = max(-12.0, min(force_n, 12.0)) if tick.in_contact else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a law has failed; put in words only then, since that takes longer than the tick."""
+
+    params: LawParams
+    snapshot: LawSnapshot
+    at: int = -1
+    tick: LawTick | None = None
+
+    def __str__(self) -> str:
+        started = f"{self.params!r} started from {self.snapshot}"
+        return started if self.tick is None else f"{started}, then at tick {self.at}: {self.tick}"
 
 
 def _choices(module: ModuleType) -> dict[str, tuple[Any, ...]]:
@@ -246,25 +261,25 @@ def _started(module: ModuleType, params: LawParams, snapshot: LawSnapshot) -> An
     try:
         module.start(state, plain_object("Params", scalar_params(params)), snapshot)
     except Exception as error:
-        error.add_note(f"{params!r} started from {snapshot}")
+        error.add_note(f"{_Place(params, snapshot)}")
         raise
     return state
 
 
-def _stepped(module: ModuleType, state: Any, params: Any, tick: LawTick, where: str) -> Any:
+def _stepped(module: ModuleType, state: Any, params: Any, tick: LawTick, where: _Place) -> Any:
     try:
         return module.step(state, params, tick)
     except Exception as error:
-        error.add_note(where)
+        error.add_note(f"{where}")
         raise
 
 
-def _check_number(force_n: object, where: str) -> None:
+def _check_number(force_n: object, where: _Place) -> None:
     assert type(force_n) in (float, int), f"a force of {force_n!r}: {where}"
     assert math.isfinite(typing.cast("float", force_n)), f"a force of {force_n!r}: {where}"
 
 
-def _check_state(module: ModuleType, state: Any, where: str) -> None:
+def _check_state(module: ModuleType, state: Any, where: _Place) -> None:
     """Every field is a finite number of its declared kind; a whole number serves where a float is declared."""
     for name, kind in state_fields(module).items():
         value = getattr(state, name)
