@@ -10,9 +10,9 @@ import ast
 import inspect
 import textwrap
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from types import FunctionType
-from typing import Any, TypeVar, cast
+from typing import Any, TypeGuard, TypeVar, cast
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
@@ -30,23 +30,28 @@ def specialise(
         switches: name to on or off, for names that stand alone or first in an `if`.
         calls: functions to put in the place of these names.
     """
-    return cast(
-        "FunctionT",
-        _specialise(function, tuple(sorted(switches.items())), tuple(sorted((calls or {}).items(), key=_name))),
-    )
+    return cast("FunctionT", _specialise(cast("FunctionType", function), switches, calls or {}))
+
+
+def _specialise(
+    function: FunctionType, switches: Mapping[str, bool], calls: Mapping[str, Callable[..., Any]]
+) -> FunctionType:
+    """The copy for what the function knows of all that: what differs in nothing else is made once."""
+    known = _names(function)
+    on = tuple(sorted(item for item in switches.items() if item[0] in known))
+    return _made(function, on, tuple(sorted((item for item in calls.items() if item[0] in known), key=_name)))
 
 
 def _name(item: tuple[str, Any]) -> str:
     return item[0]
 
 
-@lru_cache(maxsize=256)
-def _specialise(
+@lru_cache(maxsize=1024)
+def _made(
     function: FunctionType, switches: tuple[tuple[str, bool], ...], calls: tuple[tuple[str, Any], ...]
 ) -> FunctionType:
-    lines, first = inspect.getsourcelines(function)
-    tree = ast.parse(textwrap.dedent("".join(lines)))
-    tree = ast.fix_missing_locations(_Pruner(dict(switches)).visit(tree))
+    text, first = _source(function)
+    tree = ast.fix_missing_locations(_Pruner(dict(switches)).visit(ast.parse(text)))
     ast.increment_lineno(tree, first - 1)
     definition = tree.body[0]
     assert isinstance(definition, ast.FunctionDef)
@@ -55,14 +60,45 @@ def _specialise(
         argument.annotation = None
     names = dict(function.__globals__)
     names.update(calls)
-    for name in {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)} - set(dict(calls)):
+    for name in _used(definition) - set(dict(calls)):
         callee = names.get(name)
-        if isinstance(callee, FunctionType) and _package(callee) == _package(function) and callee is not function:
-            names[name] = _specialise(callee, switches, calls)
+        if _is_with(callee, function):
+            names[name] = _specialise(callee, dict(switches), dict(calls))
     exec(compile(tree, inspect.getfile(function), "exec"), names)
     specialised = names[function.__name__]
     assert isinstance(specialised, FunctionType)
     return specialised
+
+
+@cache
+def _source(function: FunctionType) -> tuple[str, int]:
+    """The text of a function, and the number of its first line."""
+    lines, first = inspect.getsourcelines(function)
+    return textwrap.dedent("".join(lines)), first
+
+
+@cache
+def _names(function: FunctionType) -> frozenset[str]:
+    """All names that a function uses, and those of its package that it calls."""
+    found: set[str] = set()
+    seen, waiting = {function}, [function]
+    while waiting:
+        each = waiting.pop()
+        used = _used(ast.parse(_source(each)[0]))
+        found |= used
+        for callee in map(each.__globals__.get, used):
+            if _is_with(callee, each) and callee not in seen:
+                seen.add(callee)
+                waiting.append(callee)
+    return frozenset(found)
+
+
+def _used(tree: ast.AST) -> set[str]:
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+
+
+def _is_with(callee: object, function: FunctionType) -> TypeGuard[FunctionType]:
+    return isinstance(callee, FunctionType) and callee is not function and _package(callee) == _package(function)
 
 
 def _package(function: FunctionType) -> str:
