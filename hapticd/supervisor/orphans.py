@@ -12,8 +12,6 @@ from pathlib import Path
 
 from hapticd.supervisor.child import END_TIMEOUT_S, KILL_TIMEOUT_S
 
-_SAID = (b"hapticd.loop.process", b"--parent")
-
 
 def kill_orphans(supervisor_pid: int) -> bool:
     """Leave the loops of a dead supervisor the time to let go, which they do at its death; kill those that do not.
@@ -42,12 +40,13 @@ def kill_orphans(supervisor_pid: int) -> bool:
 
 def _loops_of(supervisor_pid: int) -> Iterator[int]:
     """Descriptors of the processes: a number may be another's by the time at which a signal is sent to it."""
-    wanted = {*_SAID, str(supervisor_pid).encode()}
+    parent = f"\0--parent\0{supervisor_pid}\0".encode()
     for entry in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # it has just ended
             process = os.pidfd_open(int(entry.name))
             try:
-                theirs = wanted <= set((entry / "cmdline").read_bytes().split(b"\0"))
+                command = (entry / "cmdline").read_bytes()
+                theirs = b"\0hapticd.loop.process\0" in command and parent in command
             except OSError:
                 theirs = False
             if theirs:
