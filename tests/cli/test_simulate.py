@@ -199,7 +199,7 @@ def test_the_summary_is_what_the_rows_say(tmp_path: Path) -> None:
         (["-d", "1", "-o", "run.txt"], "run.txt: must end in .csv or .npz"),
         (["-d", "1", "-o", "nowhere/run.csv"], "nowhere/run.csv: there is no directory nowhere"),
         (["-d", "1", "-o", "old.csv"], "old.csv: exists; add --overwrite to replace it"),
-        (["-d", "1e9", "-o", "run.npz"], "run.npz: 1000000000000 ticks take 73 TB of memory and"),
+        (["-d", "1e9", "-o", "run.npz"], "run.npz: 1000000000000 ticks take 74 TB of memory and"),
         (["-d", "1e9", "-o", "run.csv"], "run.csv: 1000000000000 ticks take about 132 TB and"),
     ],
 )
@@ -265,8 +265,8 @@ def test_overwrite_replaces_the_file_only_when_the_run_is_complete(tmp_path: Pat
 
 
 def test_a_trace_beyond_memory_is_refused_with_the_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(traces, "_free_memory", lambda: 72_999)
-    said = r"1000 ticks take 73 kB of memory and 73 kB are free; a \.csv is written tick by tick"
+    monkeypatch.setattr(traces, "_free_memory", lambda: 73_999)
+    said = r"1000 ticks take 74 kB of memory and 74 kB are free; a \.csv is written tick by tick"
     with pytest.raises(Exception, match=said):
         open_trace(tmp_path / "run.npz", 1000, overwrite=False)
     with open_trace(tmp_path / "run.csv", 1000, overwrite=False):
