@@ -99,7 +99,7 @@ class RequestQueue:
         while self._disarmed and fetched > self._disarmed[0][0]:
             _, asker, waits = self._disarmed.popleft()
             if waits:
-                if not self._letting_go:  # who asks again and again puts nobody off
+                if not self._letting_go:  # later askers must not delay earlier ones
                     self._let_go_by = words[RECORDS] + 1
                 self._letting_go.append(asker)
             else:
@@ -129,7 +129,7 @@ class RequestQueue:
                         self.submit(other.request, other.answer)
 
     def _turn_letting_go(self, fetched: int, flags: int) -> None:
-        """A device is told to let go after the first record without a force: the next one says that it has."""
+        """Answer with the record after the first without a force: the loop disables the device between the two."""
         if flags & Flag.RELEASING:
             self._let_go_by = self._shared.words[RECORDS] + 1
         elif flags & Flag.ARMED or fetched > self._let_go_by:

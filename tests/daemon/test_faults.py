@@ -279,7 +279,7 @@ def test_who_disarms_a_device_that_does_not_let_go_hears_of_it() -> None:
 
 
 @anew_where_late
-def test_who_disarms_a_device_that_lets_go_waits_for_that_and_no_longer() -> None:
+def test_who_disarms_a_device_that_lets_go_hears_so_once_it_has() -> None:
     with Rig(safety="ramp_s = 0.5") as rig:
         rig.pressed()
         rig.order("")

@@ -106,8 +106,8 @@ def test_the_helper_is_bound_to_no_processor() -> None:
 
 
 def test_no_process_but_a_loop_of_that_supervisor_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop whose socket had the dead supervisor's number was killed: in a container both are small."""
     monkeypatch.setattr("hapticd.supervisor.orphans.END_TIMEOUT_S", 0.0)
-    """One whose socket had the dead supervisor's number was: in a container both are small."""
     waits = [sys.executable, "-c", "input()", "hapticd.loop.process", "--socket", "99999991", "--parent"]
     with (
         subprocess.Popen([*waits, "99999991"], stdin=subprocess.PIPE) as theirs,

@@ -103,7 +103,7 @@ class Faulty(Loopback):
         self._applied(force_n[0], 1)
 
     def _disable(self) -> None:
-        if self._order == "keeps":  # whoever asks
+        if self._order == "keeps":  # from every process, the helper included
             raise OSError(5, "Input/output error")
         if self._order in SILENT and Path(sys.argv[0]).stem == "process":
             time.sleep(HANG_S * (self._order == "hang-disable"))

@@ -182,7 +182,7 @@ def test_a_device_that_never_follows_is_the_fault_that_its_driver_makes_of_it(sl
 
 
 def test_one_that_follows_no_more_while_armed_is_a_fault_and_gets_no_force_back(slow: Slow) -> None:
-    """All of 10 N was there again in one tick once it followed again, and was told of meanwhile."""
+    """Telemetry went on with 10 N, and all of it came back in one tick once the device followed again."""
 
     def lapse() -> None:
         if len(slow.enabled) in (100, 110):

@@ -207,7 +207,7 @@ def test_every_fault_and_mode_that_lets_go_says_what_to_do() -> None:
     for mode in (Mode.FAULT, Mode.TIMEOUT, Mode.STOPPED, Mode.CURRENT):
         assert stopped_text(mode, 32, 20.0)
     assert "fault 77" in stopped_text(Mode.FAULT, 77, 20.0)
-    assert "motor supply" in stopped_text(4, 0, 20.0), "it may have no power, and nobody else may command it"
+    assert "motor supply" in stopped_text(4, 0, 20.0), "the cause may be its power, not another program"
 
 
 def test_the_floats_on_the_wire_are_those_of_this_computer() -> None:

@@ -196,7 +196,7 @@ def test_a_write_that_stalls_costs_the_loop_no_tick_and_the_rig_its_force(double
 
 
 def stall(double: HidDouble, subscriber: Subscriber) -> bool:
-    """Hold a write up for as long as the loop takes to notice, and take the hand away meanwhile.
+    """Delay a write until the loop notices, and take the hand away while it waits.
 
     Returns:
         False where it was held for longer than a disable waits for its answer: then the loop gave the rig up.
