@@ -12,12 +12,14 @@ scheduling there is no witness, and every failure is one.
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import struct
 import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -127,9 +129,19 @@ def reports(item: pytest.Item, next_item: pytest.Item | None) -> list[pytest.Tes
     if excused:
         with contextlib.suppress(Exception):  # what ended by the standstill may not end well
             item.session._setupstate.teardown_exact(None)  # a daemon that serves a whole file is another one then
+        _forget()
         told = runtestprotocol(item, nextitem=next_item, log=False)
         said = f"{item.nodeid} ran twice: {excused}"
         for report in told:
             report.user_properties.append(("prints", said))
             report.sections.append(("standstill", said))  # for one that fails again
     return told
+
+
+def _forget() -> None:
+    """Let go of what a failed test held: a file or process that it could not close would fail a later test."""
+    for held in ("last_value", "last_traceback", "last_exc"):
+        setattr(sys, held, None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        gc.collect()

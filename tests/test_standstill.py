@@ -23,6 +23,8 @@ def pytest_runtest_protocol(item, nextitem):
 """
 
 TEST = """
+import gc
+import subprocess
 from pathlib import Path
 import pytest
 from tests import standstill
@@ -37,8 +39,11 @@ def test_that_fails_at_first(daemon):
     runs = Path(__file__).with_name("runs")
     runs.write_text(runs.read_text() + "x")
     {during}
+    left = subprocess.Popen("true")
     assert daemon > 1
+    left.wait()
 def test_after(daemon):
+    gc.collect()
     assert daemon == len(Path(__file__).with_name("runs").read_text())
 """
 
@@ -94,12 +99,15 @@ def test_a_witness_that_got_no_processor_tells_for_how_long(monkeypatch: pytest.
 def test_what_fails_runs_again_only_where_the_computer_stood_still_or_crawled(
     tmp_path: Path, during: str, runs: int, code: int
 ) -> None:
-    """And then with another daemon, which those after it have too: the one before has ended."""
+    """And then with another daemon, which those after it have too: the one before has ended.
+
+    What it did not close by then fails no other test.
+    """
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_it.py").write_text(TEST.format(during=during))
     for counted in ("runs", "daemons"):
         (tmp_path / counted).write_text("")
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir=.", "."]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error", "--rootdir=.", "."]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTEST_ADDOPTS": ""}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == code, done.stdout

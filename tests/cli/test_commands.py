@@ -19,6 +19,7 @@ from hapticd.cli.app import COMMANDS, GROUP, application
 from hapticd.client import RefusedError
 from hapticd.errors import DeviceNotFoundError
 from tests.cli.shell import GOOD, HAPTICD, hapticd
+from tests.daemon.running import sleeps, wait_until
 
 
 def test_version_and_help_are_answers() -> None:
@@ -215,8 +216,12 @@ def test_nor_for_one_that_is_armed_or_has_no_device(
 def test_an_interrupt_ends_with_130(tmp_path: Path) -> None:
     fifo = tmp_path / "never.toml"
     os.mkfifo(fifo)
-    waiting = subprocess.Popen([HAPTICD, "check", fifo], stderr=subprocess.PIPE, text=True)
-    with fifo.open("w"):  # opens once the command reads, and gives it nothing
+    with (
+        subprocess.Popen([HAPTICD, "check", fifo], stderr=subprocess.PIPE, text=True) as waiting,
+        fifo.open("w"),  # once the command opens it, and gives it nothing
+    ):
+        # an interrupt just before a read would be seen only once the read ends
+        wait_until(lambda: sleeps(waiting.pid), "a command that reads")
         waiting.send_signal(signal.SIGINT)
         _, errors = waiting.communicate(timeout=20)
     assert (waiting.returncode, errors) == (130, "")

@@ -188,9 +188,18 @@ def all_records(memory: SharedMemory) -> list[TickRecord]:
 def gone(pid: int) -> bool:
     """Whether a process has ended (a zombie has)."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+        return _state(pid) == "Z"
     except (FileNotFoundError, ProcessLookupError):
         return True
+
+
+def sleeps(pid: int) -> bool:
+    """Whether a process waits for something, as for a signal or for what it reads."""
+    return _state(pid) == "S"
+
+
+def _state(pid: int) -> str:
+    return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
 
 
 def wait_until(condition: Any, what: str) -> None:
