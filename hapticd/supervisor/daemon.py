@@ -10,14 +10,13 @@ import asyncio
 import contextlib
 import signal
 import time
-from dataclasses import replace
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.keys.connections import raise_descriptor_limit
 from hapticd.keys.policy import key_ring
-from hapticd.loop.resume import FROM_START, identity
+from hapticd.loop.resume import identity
 from hapticd.paths import CONTROL, TELEMETRY, fault_directory, hold_file
-from hapticd.supervisor.arm_hold import HELD, ArmHold
+from hapticd.supervisor.arm_hold import ArmHold
 from hapticd.supervisor.child import END_TIMEOUT_S, LoopProcess, LoopStart
 from hapticd.supervisor.command_handler import CommandHandler
 from hapticd.supervisor.commands import CommandSocket
@@ -91,8 +90,8 @@ class Daemon:
             undo.callback(remote.close)
             remote.prepare(config)
             hold = ArmHold(hold_file(instance))
-            resume = replace(FROM_START, may_arm=not hold.held)
-            start = LoopStart(config, self._rescue, resume, wait=True)  # both import what they need at the same time
+            # both import what they need at the same time
+            start = LoopStart(config, self._rescue, hold.resume(config), wait=True)
             with contextlib.ExitStack() as on_the_way:
                 on_the_way.callback(start.end)
                 self.release.wait_ready()  # before there can be a force to take away; if it is not, that is said later
@@ -232,6 +231,8 @@ class Daemon:
         self._handler.end(self.release.force_left)
         state.event_log.close(state.config, state.loop, RECORD_TIMEOUT_S)
         self._handler.end(self.release.force_left)  # for who has asked while that took its time
+        if self._stopping and self.exit_code == self._stop_code == 0:
+            state.arm_hold.end()
         return self.exit_code
 
     def _turn(self) -> None:
@@ -298,7 +299,7 @@ class Daemon:
         if state.recovery.lost:
             state.arm_hold.follow_lost(state.loop, state.recovery.resume)
         else:
-            state.arm_hold.follow(state.loop, state.status.flags)
+            state.arm_hold.follow(state.loop, state.status.flags, state.config)
 
     def _look_after_loop(self, now_s: float) -> None:
         state = self.state
@@ -390,7 +391,7 @@ class Daemon:
         """What stands and should be known, each a line."""
         state = self.state
         arms_itself = state.config.config.safety.auto_arm or state.loop.info.simulated
-        held = HELD if arms_itself and state.arm_hold.inherited else ""
+        held = state.arm_hold.inherited if arms_itself else ""
         return [problem for problem in (held, self._problem) if problem]
 
     def _publish_status(self) -> None:

@@ -367,7 +367,7 @@ def test_a_burst_of_missed_deadlines_is_a_warning_and_one_event(record_property:
         assert 10 <= event["skipped"] < 50
         rig.mend()
         assert subscriber.until("hapticd/status", armed=True)["fault_code"] == 0
-        assert not (rig.daemon.directory / "state").exists(), "a warning is no fault to keep a record of"
+        assert not (rig.daemon.directory / "state/default/faults").exists(), "a warning is no fault to keep a record of"
 
 
 @anew_where_late

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from hapticd.loop.memory import DISARM
+from hapticd.config.loading import LoadedConfig, parse
+from hapticd.loop.memory import DISARM, FIELDS, LAW_CODE, PORT_LAW_CODE
 from hapticd.loop.resume import FROM_START, ResumeState
-from hapticd.supervisor.arm_hold import ArmHold
+from hapticd.supervisor.arm_hold import EDITED, ArmHold
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
 from tests.faults.rig import Rig, anew_where_late, events_until
@@ -91,8 +93,53 @@ def test_what_was_armed_arms_itself_again(end: Any) -> None:
         assert HELD not in rig.daemon.output()
 
 
-def loop(asked: int = 0, simulated: bool = False) -> Any:
-    return SimpleNamespace(info=SimpleNamespace(simulated=simulated), shared=SimpleNamespace(words={DISARM: asked}))
+def edit(rig: Rig) -> None:
+    rig.daemon.config.write_text(rig.daemon.config.read_text() + "# edited\n")
+
+
+@anew_where_late
+def test_what_was_edited_since_a_daemon_died_arms_itself_only_once_somebody_asks() -> None:
+    """A wall of 12 kN/m that had become one of 112 pushed as soon as systemd had started the daemon anew."""
+    with Rig(safety="auto_arm = true") as rig:
+        rig.pressing()
+        armed(rig)
+        edit(rig)
+        for _ in range(2):  # also one that dies once more
+            rig.daemon.again()
+            status = rig.ask("status")["status"]
+            assert (status["armed"], EDITED in str(status["warnings"])) == (False, True)
+            armed(rig)
+        rig.daemon.again()
+        rig.goes_on("arm")
+        assert EDITED not in str(rig.ask("status")["status"]["warnings"])
+        armed(rig)
+        rig.daemon.again()
+        rig.pressing()
+
+
+@anew_where_late
+def test_what_was_edited_and_reloaded_or_is_started_after_an_orderly_end_arms_itself() -> None:
+    with Rig(safety="auto_arm = true") as rig:
+        rig.pressing()
+        edit(rig)
+        assert rig.ask("reload", wait=True)["ok"]
+        assert rig.ask("status")["status"]["armed"]  # answered once the reload is kept as well
+        armed(rig)
+        rig.daemon.again()
+        rig.pressing()
+        assert rig.ask("stop")["ok"]
+        edit(rig)
+        rig.daemon.again()
+        rig.pressing()
+
+
+def loop(asked: int = 0, simulated: bool = False, codes: tuple[int, int, int] = (1, 2, 3)) -> Any:
+    words = {DISARM: asked, **dict(zip((LAW_CODE, PORT_LAW_CODE, FIELDS), codes, strict=True))}
+    return SimpleNamespace(info=SimpleNamespace(simulated=simulated), shared=SimpleNamespace(words=words))
+
+
+def running(text: str = "") -> LoadedConfig:
+    return parse(text, "running")
 
 
 class TestTheFile:
@@ -111,7 +158,7 @@ class TestTheFile:
             (Flag.LATCHED | Flag.RELEASING, 0, True),
             (0, 0, True),  # cleared, and not armed yet
         ):
-            hold.follow(loop(asked), flags)
+            hold.follow(loop(asked), flags, running())
             assert (hold.held, path.exists(), ArmHold(path).held) == (held, held, held)
 
     @pytest.mark.parametrize("resume", [ResumeState(may_arm=False), ResumeState(latched=True)])
@@ -124,9 +171,34 @@ class TestTheFile:
 
     def test_a_simulated_device_pushes_on_nobody(self, path: Path) -> None:
         hold = ArmHold(path)
-        hold.follow(loop(1, simulated=True), 0)
+        hold.follow(loop(1, simulated=True), 0, running())
+        hold.follow(loop(simulated=True), Flag.ARMED, running())
         hold.keep(loop(simulated=True))
-        assert not path.exists()
+        assert not path.parent.exists()
+
+    def test_the_next_one_goes_on_from_what_the_device_was_armed_with(self, path: Path) -> None:
+        hold = ArmHold(path)
+        assert hold.resume(running()) == FROM_START
+        hold.follow(loop(), Flag.ARMED, running())
+        as_it_was = ResumeState(law_code=1, port_law_code=2, fields=3)
+        assert ArmHold(path).resume(running()) == as_it_was
+        edited = ArmHold(path)
+        assert edited.resume(running("# edited")) == ResumeState(may_arm=False)
+        assert edited.inherited == EDITED
+        hold.follow(loop(codes=(4, 2, 3)), Flag.ARMED, running("# edited"))
+        assert ArmHold(path).resume(running("# edited")) == replace(as_it_was, law_code=4)
+        edited.follow(loop(), Flag.ARMED, running("# edited"))
+        assert edited.inherited == ""
+        hold.end()
+        assert ArmHold(path).resume(running()) == FROM_START
+
+    @pytest.mark.parametrize("text", [b"", b"\xff", b"hash 1 2", b"hash 1 2 x"])
+    def test_a_file_cut_short_holds(self, path: Path, text: bytes) -> None:
+        path.parent.mkdir()
+        path.with_name("armed").write_bytes(text.replace(b"hash", running().sha256.encode()))
+        hold = ArmHold(path)
+        assert not hold.resume(running()).may_arm
+        assert hold.inherited == EDITED
 
     def test_a_directory_that_takes_nothing_is_told_of_once(self, path: Path, caplog: pytest.LogCaptureFixture) -> None:
         path.parent.touch()
@@ -137,6 +209,11 @@ class TestTheFile:
         (line,) = caplog.messages
         assert line.startswith(str(path))
         assert line.endswith("does not know that the device stays disarmed")
+        path.parent.unlink()
+        hold.keep(loop())
+        assert ArmHold(path).held, "a disk that was full takes it later"
+        hold.follow(loop(), Flag.ARMED, running())
+        assert not ArmHold(path).held
 
     def test_a_file_that_nobody_can_look_for_holds(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         def refused(_path: Path) -> None:
