@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
 
 from tests.daemon.running import Daemon
 from tests.daemon.test_flood import FEW_DESCRIPTORS, flood
@@ -48,10 +49,16 @@ def test_ten_thousand_commands_of_one_page_do_not_keep_another_from_disarming(se
             except ConnectionClosed:  # it may be dropped for what it does not read
                 break
             if number in (COMMANDS // 4, COMMANDS // 2):
-                assert answered(page, {"do": "disarm"})["ok"]
-        assert answered(page, {"do": "disarm"})["ok"]
+                was_disarmed(page)
+        was_disarmed(page)
     is_well(served)
     assert served.memory_kb() < LARGEST_KB
+
+
+def was_disarmed(page: ClientConnection) -> None:
+    """Whoever goes on arming may have done so by the time that the device had let go: then that is the answer."""
+    said = answered(page, {"do": "disarm"})
+    assert said["ok"] or said["text"] == "it was disarmed, and somebody has armed it again since"
 
 
 def test_a_message_in_endless_pieces_ends_its_connection(served: Served) -> None:

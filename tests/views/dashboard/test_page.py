@@ -9,6 +9,7 @@ import pytest
 
 from hapticd.client import EventCode
 from tests.daemon.running import Daemon, Subscriber
+from tests.faults.rig import Rig, anew_where_late
 from tests.views.dashboard.browser import Browser, Page
 from tests.views.dashboard.served import Served
 
@@ -358,6 +359,17 @@ def test_a_force_that_is_ramped_out_after_a_fault_is_said(browser: Browser) -> N
         assert daemon.ask("reload") == ""
         state(page, "Fault, releasing")
         state(page, "Fault")
+
+
+@anew_where_late
+def test_who_disarms_a_device_that_does_not_let_go_is_told(browser: Browser) -> None:
+    """The button was content when the ramp began."""
+    with Rig() as rig, Served(rig.daemon.directory / "run") as served, browser.page(served.command) as page:
+        rig.pressed()
+        state(page, "Armed")
+        rig.order("keeps")
+        page.click("#disarm")
+        page.wait_for("document.getElementById('answer').innerText.includes('the force may still be there')")
 
 
 def test_a_daemon_that_has_gone_is_said(browser: Browser, served: Served, daemon: Daemon) -> None:

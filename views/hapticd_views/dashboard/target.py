@@ -52,11 +52,12 @@ class Target:
         return Client(self.endpoint, topics=_TOPICS, keys=self.keys)
 
     def ask(self, do: str) -> None:
-        """Have the daemon do something, and return when it has answered.
+        """Have the daemon do something, and return when it has answered: `disarm` once the device has let go.
 
         Raises:
             HapticdError: as `hapticd.client.commands.command`.
         """
         if not self.is_here and self.control is None:
             raise ClientError(f"{self.telemetry} is only watched: name its control.tcp with --control")
-        command(do, self.instance, connect=self.control, keys=self.keys)
+        waits = {"wait": True} if do == "disarm" else {}
+        command(do, self.instance, connect=self.control, keys=self.keys, **waits)
