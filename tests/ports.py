@@ -6,6 +6,7 @@ again: a flood of 1500 connections beside it takes one port in twenty of those t
 
 from __future__ import annotations
 
+import atexit
 import itertools
 import socket
 from collections import deque
@@ -34,3 +35,10 @@ def free_port() -> int:
             _held.popleft().close()
         return port
     raise AssertionError("no port is free")
+
+
+@atexit.register
+def _let_go() -> None:
+    """Close what is held, of which Python would complain."""
+    while _held:
+        _held.pop().close()
