@@ -45,14 +45,29 @@ def daemon() -> Iterator[Daemon]:
 
 
 def connected(daemon: Daemon, endpoint: str, kind: bytes) -> socket.socket:
-    """A connection to a socket of the daemon that has said hello as ZeroMQ does (ZMTP 3.1, NULL)."""
+    """A connection to a socket of the daemon that has said hello as ZeroMQ does (ZMTP 3.1, NULL), and heard its hello.
+
+    What came before ZeroMQ has said its own is no message to it, and ends the connection at once.
+    """
     raw = socket.socket(socket.AF_UNIX)
     raw.settimeout(PATIENCE_S)
     raw.connect(str(daemon.directory / "run/default" / endpoint))
     said = b"\x05READY\x0bSocket-Type" + struct.pack(">I", len(kind)) + kind
     raw.sendall(b"\xff" + bytes(7) + b"\x01\x7f\x03\x01NULL".ljust(24, b"\0") + bytes(32))
     raw.sendall(b"\x04" + bytes([len(said)]) + said)
+    heard(raw, 64)
+    heard(raw, heard(raw, 2)[1])
     return raw
+
+
+def heard(raw: socket.socket, size: int) -> bytes:
+    """The next so many bytes of a connection."""
+    said = b""
+    while len(said) < size:
+        piece = raw.recv(size - len(said))
+        assert piece, "the connection was ended"
+        said += piece
+    return said
 
 
 def send_until_ended(raw: socket.socket, size: int) -> None:
