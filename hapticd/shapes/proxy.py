@@ -49,7 +49,7 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float,
     """
     share = 1.0
     ex = ey = ez = 0.0
-    crease = False
+    crease = far = False
     wx = px - proxy.gx
     wy = py - proxy.gy
     wz = pz - proxy.gz
@@ -79,7 +79,7 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float,
         else:
             d, x, y, z, mx, my, mz = land(proxy, others, voxels, proxy.gx + tx, proxy.gy + ty, proxy.gz + tz)
         turn = nx * mx + ny * my + nz * mz
-        if -_ONE_FACE < turn < _ONE_FACE:
+        if -_ONE_FACE < turn < _ONE_FACE and not far:
             d, x, y, z, mx, my, mz = land_on_crease(proxy, others, voxels, px, py, pz, wall, d, x, y, z, mx, my, mz)
 
         # nearer: there it is
@@ -87,13 +87,16 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float,
         vy = py - y
         vz = pz - z
         vv = vx * vx + vy * vy + vz * vz
+        vx = x - proxy.gx
+        vy = y - proxy.gy
+        vz = z - proxy.gz
         if vv < ww and -SURFACE_M <= d <= SURFACE_M:
-            vx = x - proxy.gx
-            vy = y - proxy.gy
-            vz = z - proxy.gz
             gone_m = sqrt(vx * vx + vy * vy + vz * vz)
-            if gone_m > left_m:
-                share *= 0.99 * left_m / gone_m
+            if gone_m > left_m:  # that way as far as it may go: a shorter step may lead to the same far crease
+                part = sqrt(0.99 * left_m / (gone_m * (wx * vx + wy * vy + wz * vz)))
+                ex, ey, ez = part * vx, part * vy, part * vz
+                share = 1.0
+                crease = far = True
                 continue
             left_m -= gone_m
             gained = ww - vv
@@ -110,13 +113,10 @@ def slide(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float,
             if gained < proxy.least_m2 and turn > _ONE_FACE:
                 break
             share = 1.0
-            crease = False
+            crease = far = False
             continue
 
         # over an edge: seen from this face it may be free
-        vx = x - proxy.gx
-        vy = y - proxy.gy
-        vz = z - proxy.gz
         if wx * mx + wy * my + wz * mz >= 0.0 and vx * vx + vy * vy + vz * vz < _LEAST_M2:
             proxy.ux = nx = mx
             proxy.uy = ny = my

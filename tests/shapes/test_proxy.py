@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+from copy import copy
 from dataclasses import replace
 
 import pytest
@@ -175,6 +176,32 @@ def test_while_a_device_is_held_its_force_turns_no_faster_than_it_moves(
             bound = max(5.0 * norm(now.dp), 0.021 * norm(last)) + SURFACE_M
             assert norm(minus(now.spring, last)) <= bound
         last = now.spring
+
+
+@pytest.mark.parametrize(
+    ("seed", "name"), [(0, "ball"), (26, "ball"), (31, "peg"), (2, "two balls"), (43, "two balls")]
+)
+def test_along_an_inner_edge_the_goal_goes_on_however_slow_the_device_is(seed: int, name: str) -> None:
+    """Where the nearest point of the edge was further than the bound, every step led there, and the goal was stuck."""
+    peg = Placed("cylinder", HERE, radius_m=0.005, length_m=0.03)
+    balls = [
+        Placed("sphere", Pose.of((x, 0.0, z)), radius_m=0.005) for x, z in ((0.0, 0.0), (0.0, 0.002), (0.006, 0.0))
+    ]
+    table = Placed("plane", HERE)
+    union = {"peg": [table, peg], "ball": [table, balls[1]], "two balls": [balls[0], balls[2]]}[name]
+    rng = random.Random(seed)
+    speed, pull, reach_m = rng.choice([0.02, 0.1]), rng.choice([3.0, 30.0]), rng.choice([0.003, 0.006])
+    for tick, now in enumerate(walk(Proxy(union), seed, 300, speed, pull, reach_m)):
+        if tick % 10 == 9 and now.proxy.touching:
+            slow, fast = copy(now.proxy), copy(now.proxy)
+            x, y, z = now.p
+            for tremble in range(400):
+                go(slow, (x, y, z + 1e-5 * (tremble % 2)))
+            for tremble in range(40):
+                go(fast, (x, y, z + 1e-4 * (tremble % 2)))
+            go(fast, now.p)
+            if fast.touching:
+                assert slow.depth_m < 1.1 * fast.depth_m + 1e-4, tick
 
 
 @pytest.mark.parametrize("name", SOLIDS)
