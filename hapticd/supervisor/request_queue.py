@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from hapticd.errors import HapticdError
@@ -48,7 +49,7 @@ class RequestQueue:
         self._disarming: deque[tuple[int, Answer, bool]] = deque()  # each by the number of its request
         self._disarmed: deque[tuple[int, Answer, bool]] = deque()  # each by the record that was the newest then
         self._letting_go: list[Answer] = []  # until the device has let go
-        self._let_go_by = 0  # the record after which it has
+        self._let_go_by = inf  # the record after which it has: the first one that was seen without a force
         self._held: list[Answer] = []  # to disarm or stop, until it is known what became of the force
 
     def submit(self, request: dict[str, Any], answer: Answer, by_ns: int | None = None) -> None:
@@ -100,7 +101,7 @@ class RequestQueue:
             _, asker, waits = self._disarmed.popleft()
             if waits:
                 if not self._letting_go:  # later askers must not delay earlier ones
-                    self._let_go_by = words[RECORDS] + 1
+                    self._let_go_by = inf
                 self._letting_go.append(asker)
             else:
                 asker("")
@@ -130,9 +131,8 @@ class RequestQueue:
 
     def _turn_letting_go(self, fetched: int, flags: int) -> None:
         """Answer with the record after the first without a force: the loop disables the device between the two."""
-        if flags & Flag.RELEASING:
-            self._let_go_by = self._shared.words[RECORDS] + 1
-        elif flags & Flag.ARMED or fetched > self._let_go_by:
+        self._let_go_by = inf if flags & Flag.RELEASING else min(self._let_go_by, fetched)
+        if flags & Flag.ARMED or fetched > self._let_go_by:
             askers, self._letting_go = self._letting_go, []
             for asker in askers:
                 asker(ARMED_SINCE if flags & Flag.ARMED else "")

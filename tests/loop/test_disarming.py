@@ -95,6 +95,20 @@ class TestInTheQueue:
             requests.turn(record, flags)
         assert answers == [answer]
 
+    def test_the_first_record_without_a_force_does_not_say_yet_that_the_device_has_let_go(
+        self, shared: SharedMemory
+    ) -> None:
+        """The loop records a tick before it disables the device, and ticks many times in a turn of the supervisor."""
+        requests, answers = RequestQueue(shared), Answers()
+        requests.disarm(answers.to("disarm"), wait=True)
+        loop_disarms(shared)
+        for record, flags in ((1, Flag.RELEASING), (10, Flag.RELEASING), (20, 0), (20, 0)):
+            shared.words[RECORDS] = record
+            requests.turn(record, flags)
+        assert answers == []
+        requests.turn(21, 0)
+        assert answers == ["disarm: done"]
+
     @pytest.mark.parametrize("wait", [False, True])
     def test_one_who_asks_again_and_again_keeps_no_answer_away(self, shared: SharedMemory, wait: bool) -> None:
         """In each turn it has asked once more than the loop has done."""
