@@ -278,7 +278,7 @@ class SolidContact:
             self.turned = False
             share_debt(self.channels, self.ledger.debt_j)
             for channel in self.channels[: self.sides]:
-                if channel.law.publishes_mass:
+                if channel.felt_mass_kg > 0.0 or (channel.law.publishes_mass and channel.law.learns_damping):
                     channel.law.start(channel.snapshot())
         for channel in self.channels[: self.sides]:
             channel.act(periods)

@@ -31,6 +31,22 @@ def test_no_law_steps_where_a_hand_slides_round_a_ball(law: str, stiffness_n_per
     assert max(map(math.dist, sliding, sliding[1:])) <= 2.0 * CLIMB_RAD * largest_n + 0.01
 
 
+@pytest.mark.parametrize(("way_m", "stroke_m", "most_n"), [(2e-5, 3e-5, 0.1), (3e-5, 5e-5, 0.3)])
+def test_the_brake_on_arrival_goes_on_where_a_hand_slides_round_a_ball(
+    way_m: float, stroke_m: float, most_n: float
+) -> None:
+    """The law began anew at 20 degrees, and the brake of the arrival was gone in one tick: from 3.5 to 2.4 N."""
+    rig = (
+        Rig(ball(stiffness=2000.0, radius_m=0.005), "ring-damping", info=REAL)
+        .start((0.0, 0.0, 0.007))
+        .go(*(60 * [(0, 0, 0.007)]))
+    )
+    touch = round(2e-3 / way_m)
+    rig.go(*((stroke_m * max(0, n - touch), 0.0, 0.007 - way_m * n) for n in range(1, touch + 60)))
+    assert math.hypot(*rig.force) > 1.0
+    assert max(map(math.dist, rig.forces, rig.forces[1:])) < most_n
+
+
 @pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
 def test_friction_holds_alike_to_all_sides(law: str) -> None:
     """A spring along the surface is stretched either way; two laws had none where it was stretched to one side."""
