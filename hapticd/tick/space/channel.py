@@ -10,9 +10,12 @@ from hapticd.law import LawSnapshot
 from hapticd.shapes.pose import Vector
 from hapticd.tick.contact import Contact, RunningLaw
 from hapticd.tick.energy import EnergyLedger
+from hapticd.tick.guard import blended
 
 LEAST_M = 1e-15
 """A spring along the surface is never quite slack, so that a law may divide by its length [m]."""
+
+_LEAST_M2 = LEAST_M * LEAST_M
 
 
 class Direction:
@@ -124,6 +127,11 @@ class Channel(Contact):
         tick.spring_n = self.wall.spring_n = spring_n
         tick.contact_n = self._contact_n = contact_n
 
+    def lessen(self, part: float) -> None:
+        """Have its law ask for this part of what it has, 0 to 1; a blend goes over to that."""
+        self.requested_n = kept_n = part * self.requested_n
+        self.force_n = blended(self, self.x_m, kept_n, 0.0) if self.blending else kept_n
+
     def apply(self, share: float, spring_n: float) -> None:
         """Remember what is applied from now on.
 
@@ -196,7 +204,7 @@ def slip_along(
         second.dz = nx * ty - ny * tx
     for channel, moved_m in ((first, first_m), (second, second_m)):
         x_m = -(sx * channel.dx + sy * channel.dy + sz * channel.dz)
-        if -LEAST_M < x_m < LEAST_M:
+        if x_m * x_m < _LEAST_M2:
             x_m = -LEAST_M
         v_m_per_s = channel.dx * vx + channel.dy * vy + channel.dz * vz
         if held > 0:
@@ -221,7 +229,6 @@ def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: 
     proxy = solid.proxy
     channels = contact.channels
     normal = channels[0]
-    stiffness_n_per_m = gain * solid.stiffness_n_per_m
     stretch_m = stretched_m(proxy) if contact.depth_m > 0.0 else 0.0
     if dt_s > 0.0:
         taken_j = spring_j = 0.0
@@ -231,15 +238,17 @@ def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: 
             taken_j -= given_j
             spring_j -= channel.mean_spring_n * channel.way_m
         stored_j = gain * solid.stored_j(stretch_m, limit_n)
-        lost_j = stiffness_n_per_m * proxy.lost_m2
-        sticking_m = sqrt(stretch_m * stretch_m + 2.0 * proxy.lost_m2)  # how long the spring was before it slipped
-        if solid.stiffness_n_per_m * sticking_m > limit_n:
-            lost_j = gain * solid.stored_j(sticking_m, limit_n) - stored_j
         ledger = contact.ledger
+        lost_j = 0.0
+        if proxy.lost_m2 != 0.0:
+            lost_j = gain * solid.stiffness_n_per_m * proxy.lost_m2
+            sticking_m = sqrt(stretch_m * stretch_m + 2.0 * proxy.lost_m2)  # how long the spring was before it slipped
+            if solid.stiffness_n_per_m * sticking_m > limit_n:
+                lost_j = gain * solid.stored_j(sticking_m, limit_n) - stored_j
+            contact.friction_j += lost_j
+            ledger.dissipated_j += lost_j
         ledger.update(-1.0, taken_j, spring_j, stored_j + lost_j, normal.in_contact, normal.damping_n_s_per_m, dt_s)
         ledger.stored_j = stored_j
-        ledger.dissipated_j += lost_j
-        contact.friction_j += lost_j
         contact.friction_stored_j = stored_j * share_along(proxy, stretch_m)
     held = gain
     if solid.stiffness_n_per_m * stretch_m > limit_n:
@@ -280,7 +289,7 @@ def share_along(proxy: Any, stretch_m: float) -> float:
     along_m2 = proxy.stretch_x * proxy.stretch_x + proxy.stretch_y * proxy.stretch_y
     along_m2 += proxy.stretch_z * proxy.stretch_z
     whole_m2 = stretch_m * stretch_m
-    return min(1.0, along_m2 / whole_m2) if whole_m2 > 0.0 else 0.0
+    return along_m2 / whole_m2 if along_m2 < whole_m2 else 1.0
 
 
 def stretched_m(proxy: Any) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from copy import copy
-from math import inf
+from math import inf, sqrt
 
 from hapticd.shapes.pose import Vector
 from hapticd.shapes.proxy import follow, place, place_before
@@ -282,6 +282,15 @@ class SolidContact:
                     channel.law.start(channel.snapshot())
         for channel in self.channels[: self.sides]:
             channel.act(periods)
+        solid = self.solid
+        if self.sides > 1 and not solid.creases:
+            _, first, second = self.channels
+            most_n = solid.proxy.static_friction * solid.stiffness_n_per_m * self.depth_m
+            asked_n2 = first.requested_n * first.requested_n + second.requested_n * second.requested_n
+            if asked_n2 > most_n * most_n:  # no law holds a stroke by more than static friction does
+                part = most_n / sqrt(asked_n2)
+                first.lessen(part)
+                second.lessen(part)
 
     def hold(self, periods: float) -> None:
         """Stay with what the laws asked for last, at a tick without a new sample; a blend goes on."""

@@ -9,10 +9,11 @@ import math
 import pytest
 
 from hapticd import plugins
-from tests.tick.space.rig import INFO, Rig, ball
+from tests.tick.space.rig import INFO, Rig, ball, table
 
 REAL = dataclasses.replace(INFO, simulated=False, host_silence_ms=20.0)
 CLIMB_RAD = 1e-3
+ROUGH = table("box", "box", 2000.0, size_m=[0.8, 0.8, 0.02], position_m=[0.0, 0.0, -0.01], static_friction=0.5)
 
 
 @pytest.mark.parametrize("stiffness_n_per_m", [1000.0, 9000.0])
@@ -59,6 +60,29 @@ def test_friction_holds_alike_to_all_sides(law: str) -> None:
         held.append(-(x * rig.force[0] + y * rig.force[1]))
     assert held == pytest.approx([held[0]] * 4, abs=1e-6)
     assert held[0] > 1.0
+
+
+@pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
+@pytest.mark.parametrize("way_m", [1e-4, -1e-4, -3e-4])
+def test_a_stroke_over_a_rough_surface_meets_its_cone_and_no_more_from_the_touch_on(way_m: float, law: str) -> None:
+    """Laws damped it by the speed of the hand: under the default one, one way, 9.2 N of 1.2, as if the hand arrived."""
+    rig = Rig(f"{ROUGH}dynamic_friction = 0.4\n", law, info=REAL).start((0.0, 0.0, 0.002)).to((0.0, 0.0, 0.001), 60)
+    for n in range(200):
+        z_m = max(0.001 - 3e-5 * n, -0.0015)
+        rig.go((way_m * n, 0.0, z_m))
+        assert abs(rig.force[0]) <= 0.5 * 2000.0 * max(-z_m, 0.0) + 1e-9, n
+    assert abs(rig.force[0]) > 0.5
+
+
+@pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
+@pytest.mark.parametrize("way_m", [5e-5, 3e-4])
+def test_no_law_steps_where_a_stroke_to_and_fro_begins_to_slip(way_m: float, law: str) -> None:
+    """A damper that saw the slip's own speed would let go of 50 N s/m times the hand's in one tick."""
+    rig = Rig(f"{ROUGH}dynamic_friction = 0.5\n", law, info=REAL).start((0.0, 0.0, 0.002)).to((0.0, 0.0, -0.0015), 300)
+    strokes = [way_m * math.sin(2.0 * math.pi * n / 300.0) for n in range(900)]
+    rig.go(*((x_m, 0.0, -0.0015) for x_m in itertools.accumulate(strokes)))
+    assert max(abs(x) for x, _, _ in rig.forces[400:]) <= 1.5 + 1e-9
+    assert max(map(math.dist, rig.forces[400:], rig.forces[401:])) <= 0.1 + 2200.0 * way_m
 
 
 def test_a_fading_object_does_not_come_back_where_a_lost_position_is_known_again() -> None:
