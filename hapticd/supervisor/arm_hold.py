@@ -6,9 +6,10 @@ import contextlib
 import logging
 from pathlib import Path
 
+from hapticd.config.file import read
 from hapticd.config.loading import LoadedConfig
 from hapticd.errors import HapticdError
-from hapticd.loop.memory import DISARM, FIELDS, LAW_CODE, PORT_LAW_CODE
+from hapticd.loop.memory import DISARM, FIELDS, LAW_CODE, MAY_ARM, PORT_LAW_CODE
 from hapticd.loop.resume import ResumeState
 from hapticd.paths import make_directory
 from hapticd.replacing import write
@@ -16,7 +17,7 @@ from hapticd.supervisor.child import LoopProcess
 from hapticd.tick.flags import Flag
 
 HELD = "stays disarmed: it was disarmed, or a fault had stopped it, when the daemon before ended; `hapticd arm`"
-EDITED = "stays disarmed: edited, as far as can be told, since the daemon before was armed and died; `hapticd arm`"
+EDITED = "stays disarmed: edited or tared, as far as can be told, before the last daemon died; `hapticd arm`"
 
 log = logging.getLogger("hapticd")
 
@@ -25,8 +26,9 @@ class ArmHold:
     """A file that is there from a `disarm`, or a fault that latches, until the device is armed again.
 
     A daemon that dies is started again by systemd, and `safety.auto_arm` would put forces on that somebody has just
-    taken away, or that somebody has edited and not asked for. So another file, `armed`, says what was last armed with,
-    until an orderly end. Simulated devices push on nobody, and are not held.
+    taken away, or that somebody has edited and not asked for, or at a wall that a tare had put elsewhere. So another
+    file, `armed`, says with what the device was last armed or could have been by itself, until an orderly end.
+    Simulated devices push on nobody, and are not held.
 
     Args:
         path: of the file.
@@ -38,18 +40,11 @@ class ArmHold:
 
     def __init__(self, path: Path) -> None:
         self._armed_path = path.with_name("armed")
-        self._config: LoadedConfig | None = None  # what the device was last armed with
-        self._codes = (0, 0, 0)
+        self._armed: tuple[LoadedConfig, list[int], bool] | None = None  # what the device may be armed with
+        self._armed_kept = True  # the other file says the same
         self._path = path
         self._kept = True  # the file says the same as `held`
-        try:
-            path.lstat()
-        except (FileNotFoundError, NotADirectoryError):
-            self.held = False
-        except OSError:  # nobody knows
-            self.held = True
-        else:
-            self.held = True
+        self.held = _is_there(path)
         self.inherited = HELD if self.held else ""
 
     def resume(self, config: LoadedConfig) -> ResumeState:
@@ -59,29 +54,30 @@ class ArmHold:
             config: what the loop is to run.
         """
         law_code = port_law_code = fields = 0
-        try:
-            text_hash, *codes = self._armed_path.read_text("ascii").split()
-            if text_hash != config.sha256:
-                raise ValueError(text_hash)
-            law_code, port_law_code, fields = map(int, codes)
-        except (FileNotFoundError, NotADirectoryError):
-            pass
-        except (OSError, ValueError):  # edited, or nobody knows
-            self.inherited = self.inherited or EDITED
+        if _is_there(self._armed_path):
+            try:
+                text_hash, *codes = read(self._armed_path, files_only=True).split()
+                if text_hash != config.sha256:
+                    raise ValueError(text_hash)
+                law_code, port_law_code, fields = map(int, codes)
+            except (HapticdError, OSError, ValueError):  # edited, or nobody knows
+                self.inherited = self.inherited or EDITED
         return ResumeState(may_arm=not self.inherited, law_code=law_code, port_law_code=port_law_code, fields=fields)
 
-    def follow(self, loop: LoopProcess, flags: int, config: LoadedConfig) -> None:
+    def follow(self, loop: LoopProcess, flags: int, config: LoadedConfig, tared: bool) -> None:
         """Keep what the state of a running device says.
 
         Args:
             loop: the process that has it.
             flags: of its last tick; 0 before the first.
             config: what the loop runs.
+            tared: positions count from where no daemon that is started anew would count them from.
         """
+        if flags & Flag.ARMED or loop.shared.words[MAY_ARM]:
+            self._keep_armed(loop, config, tared)
         if flags & Flag.ARMED:
             self.inherited = ""
             self._keep(loop, held=False)
-            self._keep_armed(loop, config)
         elif flags & Flag.LATCHED or loop.shared.words[DISARM]:
             self._keep(loop, held=True)
 
@@ -104,23 +100,25 @@ class ArmHold:
         with contextlib.suppress(OSError):  # what is still there holds
             self._armed_path.unlink(missing_ok=True)
 
-    def _keep_armed(self, loop: LoopProcess, config: LoadedConfig) -> None:
-        words = loop.shared.words
-        codes = (words[LAW_CODE], words[PORT_LAW_CODE], words[FIELDS])
-        if (config is self._config and codes == self._codes) or loop.info.simulated:
+    def _keep_armed(self, loop: LoopProcess, config: LoadedConfig, tared: bool) -> None:
+        armed = (config, [loop.shared.words[code] for code in (LAW_CODE, PORT_LAW_CODE, FIELDS)], tared)
+        told = armed == self._armed
+        if (told and self._armed_kept) or loop.info.simulated:
             return
-        self._config, self._codes = config, codes
+        self._armed, self._armed_kept = armed, True
         try:
             make_directory(self._armed_path.parent, 0o750)
-            write(self._armed_path, " ".join([config.sha256, *map(str, codes)]).encode())
+            write(self._armed_path, " ".join(["tared" if tared else config.sha256, *map(str, armed[1])]).encode())
         except (OSError, HapticdError) as error:
-            log.warning("%s; a daemon started anew after a crash does not know what was edited since", error)
+            self._armed_kept = False
+            if not told:
+                log.warning("%s; a daemon started anew after a crash does not know what was edited since", error)
 
     def _keep(self, loop: LoopProcess, *, held: bool) -> None:
         if (held == self.held and self._kept) or loop.info.simulated:
             return
         told = held == self.held
-        self.held = held
+        self.held, self._kept = held, True
         self.inherited = ""
         try:
             if held:
@@ -132,8 +130,13 @@ class ArmHold:
             self._kept = False  # a disk that is full now may not be so at the next look
             if not told:
                 what = "stays disarmed" if held else "may be armed by itself again"
-                log.warning(
-                    "%s: %s; one that is started anew does not know that the device %s", self._path, error, what
-                )
-        else:
-            self._kept = True
+                log.warning("%s: %s; one started anew does not know that the device %s", self._path, error, what)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a file, or anything else, lies at a path, or nobody knows."""
+    try:
+        path.lstat()
+    except OSError as error:
+        return not isinstance(error, (FileNotFoundError, NotADirectoryError))
+    return True

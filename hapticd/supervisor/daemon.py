@@ -216,12 +216,8 @@ class Daemon:
                 log.warning("%s", warning)
         else:
             state.tell(EventCode.NOT_REALTIME, f"not real-time: {'; '.join(state.loop.warnings)}")
-        if self._few_descriptors:
-            log.warning("%s", self._few_descriptors)
-        for note in state.loop.info.notes:
-            log.warning("%s", note)
-        for problem in self._problems():
-            log.warning("%s", problem)
+        for line in filter(None, (self._few_descriptors, *state.loop.info.notes, *self._problems())):
+            log.warning("%s", line)
         self._publish_status()  # a request that has come already is answered by it
         while self.exit_code is None:
             self._turn()
@@ -299,7 +295,7 @@ class Daemon:
         if state.recovery.lost:
             state.arm_hold.follow_lost(state.loop, state.recovery.resume)
         else:
-            state.arm_hold.follow(state.loop, state.status.flags, state.config)
+            state.arm_hold.follow(state.loop, state.status.flags, state.config, any(state.status.origin_m.values()))
 
     def _look_after_loop(self, now_s: float) -> None:
         state = self.state

@@ -41,6 +41,7 @@ class StatusBuilder:
         last: the newest tick, None before the first.
         flags: of the newest tick of the loop that there is, or what it goes on from; 0 where nothing is known.
         rate_hz: measured lately [Hz].
+        origin_m: where it was tared to, by name [m].
         made: the status as it was made last.
     """
 
@@ -63,7 +64,7 @@ class StatusBuilder:
         self._fault_s = 0.0
         self._faults = 0
         self._started_s = timestamp_s(time.monotonic_ns(), epoch_offset_ns)
-        self._origin_m: dict[str, float] = {}
+        self.origin_m: dict[str, float] = {}
         self._ticking = False
 
     def add(self, records: Sequence[TickRecord]) -> None:
@@ -83,7 +84,7 @@ class StatusBuilder:
 
     def expect(self, resume: ResumeState) -> None:
         """A loop that has not ticked yet goes on from there; where the one before was tared to is forgotten."""
-        self._origin_m = {}
+        self.origin_m = {}
         self._ticking = False
         self.flags = Flag.LATCHED if resume.latched else 0
         self._law = resume.law
@@ -104,7 +105,7 @@ class StatusBuilder:
             self._faults += 1
             self._fault_s = timestamp_s(event.deadline_ns, self._offset_ns)
         elif event.code in (EventCode.TARED, EventCode.CALIBRATED):
-            self._origin_m = {name: float(value) for name, value in event.fields.items()}
+            self.origin_m = {name: float(value) for name, value in event.fields.items()}
 
     def make(
         self,
@@ -162,7 +163,7 @@ class StatusBuilder:
             device_metrics=values_of(config.driver.METRICS, loop.shared.metrics),
             accuracy=_accuracy(loop.accuracy, loop.fitted_hash, config.hash),
             axes=info.axes,
-            origin_m=tuple(self._origin_m.get(f"origin_{axis}_m", 0.0) for axis in info.axes),
+            origin_m=tuple(self.origin_m.get(f"origin_{axis}_m", 0.0) for axis in info.axes),
             max_force_n=_largest_force_n(settings.safety, info),
             wall_axis=tuple(wall.axis for wall in settings.scene.walls),
             wall_position_m=tuple(wall.position_m for wall in settings.scene.walls),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from hapticd.config.loading import LoadedConfig, parse
-from hapticd.loop.memory import DISARM, FIELDS, LAW_CODE, PORT_LAW_CODE
+from hapticd.loop.memory import DISARM, FIELDS, LAW_CODE, MAY_ARM, PORT_LAW_CODE
 from hapticd.loop.resume import FROM_START, ResumeState
 from hapticd.supervisor.arm_hold import EDITED, ArmHold
 from hapticd.tick.event import EventCode
@@ -133,9 +134,50 @@ def test_what_was_edited_and_reloaded_or_is_started_after_an_orderly_end_arms_it
         rig.pressing()
 
 
-def loop(asked: int = 0, simulated: bool = False, codes: tuple[int, int, int] = (1, 2, 3)) -> Any:
-    words = {DISARM: asked, **dict(zip((LAW_CODE, PORT_LAW_CODE, FIELDS), codes, strict=True))}
+@anew_where_late
+def test_a_first_arm_that_was_only_saved_and_not_asked_for_waits_for_it_after_a_crash() -> None:
+    """The device had never been armed; the daemon died, and the one that systemd started in its place pushed."""
+    with Rig(safety="auto_arm = false") as rig:
+        assert not rig.ask("status")["status"]["armed"]
+        rig.daemon.config.write_text(rig.config.replace("auto_arm = false", "auto_arm = true"))
+        for _ in range(2):
+            armed(rig)
+            rig.daemon.again()
+            status = rig.ask("status")["status"]
+            assert (status["armed"], EDITED in str(status["warnings"])) == (False, True)
+        rig.goes_on("arm")
+
+
+@anew_where_late
+def test_what_was_tared_arms_itself_only_once_somebody_asks_after_a_crash() -> None:
+    """Its wall came back to where it had stood before the tare: 0 N in the hand became 2.5 N."""
+    with Rig(safety="auto_arm = true") as rig:
+        rig.pressing()
+        assert rig.ask("disarm", wait=True)["ok"]
+        assert rig.hapticd("tare").returncode == 0
+        assert rig.ask("arm")["ok"]
+        with rig.subscriber("hapticd/status") as subscriber:
+            assert any(subscriber.until("hapticd/status", armed=True)["origin_m"])
+        armed(rig)
+        rig.daemon.again()
+        status = rig.ask("status")["status"]
+        assert (status["armed"], EDITED in str(status["warnings"])) == (False, True)
+        rig.goes_on("arm")
+        armed(rig)
+        rig.daemon.again()
+        rig.pressing()
+
+
+def loop(
+    asked: int = 0, simulated: bool = False, codes: tuple[int, int, int] = (1, 2, 3), may_arm: bool = False
+) -> Any:
+    words = {DISARM: asked, MAY_ARM: may_arm, **dict(zip((LAW_CODE, PORT_LAW_CODE, FIELDS), codes, strict=True))}
     return SimpleNamespace(info=SimpleNamespace(simulated=simulated), shared=SimpleNamespace(words=words))
+
+
+def sparse(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(1 << 27)
 
 
 def running(text: str = "") -> LoadedConfig:
@@ -158,7 +200,7 @@ class TestTheFile:
             (Flag.LATCHED | Flag.RELEASING, 0, True),
             (0, 0, True),  # cleared, and not armed yet
         ):
-            hold.follow(loop(asked), flags, running())
+            hold.follow(loop(asked), flags, running(), False)
             assert (hold.held, path.exists(), ArmHold(path).held) == (held, held, held)
 
     @pytest.mark.parametrize("resume", [ResumeState(may_arm=False), ResumeState(latched=True)])
@@ -171,24 +213,26 @@ class TestTheFile:
 
     def test_a_simulated_device_pushes_on_nobody(self, path: Path) -> None:
         hold = ArmHold(path)
-        hold.follow(loop(1, simulated=True), 0, running())
-        hold.follow(loop(simulated=True), Flag.ARMED, running())
+        hold.follow(loop(1, simulated=True), 0, running(), False)
+        hold.follow(loop(simulated=True), Flag.ARMED, running(), False)
         hold.keep(loop(simulated=True))
         assert not path.parent.exists()
 
     def test_the_next_one_goes_on_from_what_the_device_was_armed_with(self, path: Path) -> None:
         hold = ArmHold(path)
         assert hold.resume(running()) == FROM_START
-        hold.follow(loop(), Flag.ARMED, running())
+        hold.follow(loop(), Flag.ARMED, running(), False)
         as_it_was = ResumeState(law_code=1, port_law_code=2, fields=3)
         assert ArmHold(path).resume(running()) == as_it_was
         edited = ArmHold(path)
         assert edited.resume(running("# edited")) == ResumeState(may_arm=False)
         assert edited.inherited == EDITED
-        hold.follow(loop(codes=(4, 2, 3)), Flag.ARMED, running("# edited"))
+        hold.follow(loop(codes=(4, 2, 3)), Flag.ARMED, running("# edited"), False)
         assert ArmHold(path).resume(running("# edited")) == replace(as_it_was, law_code=4)
-        edited.follow(loop(), Flag.ARMED, running("# edited"))
+        edited.follow(loop(), Flag.ARMED, running("# edited"), False)
         assert edited.inherited == ""
+        hold.follow(loop(), Flag.ARMED, running(), True)
+        assert not ArmHold(path).resume(running()).may_arm, "tared"
         hold.end()
         assert ArmHold(path).resume(running()) == FROM_START
 
@@ -199,6 +243,39 @@ class TestTheFile:
         hold = ArmHold(path)
         assert not hold.resume(running()).may_arm
         assert hold.inherited == EDITED
+
+    def test_what_waits_for_its_first_arm_is_kept_as_well(self, path: Path) -> None:
+        hold = ArmHold(path)
+        hold.follow(loop(), 0, running(), False)
+        assert not path.parent.exists(), "what may not be armed by itself is not what the next one may arm by itself"
+        hold.follow(loop(may_arm=True), 0, running(), False)
+        assert ArmHold(path).resume(running()).may_arm
+        assert not ArmHold(path).resume(running("# edited")).may_arm
+
+    @pytest.mark.parametrize("lay", [os.mkfifo, Path.mkdir, lambda path: path.symlink_to("nowhere"), sparse])
+    def test_what_is_no_file_of_a_daemon_holds_and_no_start_waits_for_it(self, path: Path, lay: Any) -> None:
+        """A start waited for who writes to a pipe for ever, and 1 GB was read as a whole."""
+        path.parent.mkdir()
+        lay(path.with_name("armed"))
+        tracemalloc.start()
+        try:
+            assert not ArmHold(path).resume(running()).may_arm
+            assert tracemalloc.get_traced_memory()[1] < 1 << 23
+        finally:
+            tracemalloc.stop()
+
+    def test_what_a_full_disk_did_not_take_is_kept_once_it_does(
+        self, path: Path, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        path.parent.touch()
+        hold = ArmHold(path)
+        for _ in range(3):
+            hold.follow(loop(), Flag.ARMED, running(), False)
+        (line,) = caplog.messages
+        assert line.endswith("does not know what was edited since")
+        path.parent.unlink()
+        hold.follow(loop(), Flag.ARMED, running(), False)
+        assert not ArmHold(path).resume(running("# edited")).may_arm
 
     def test_a_directory_that_takes_nothing_is_told_of_once(self, path: Path, caplog: pytest.LogCaptureFixture) -> None:
         path.parent.touch()
@@ -212,7 +289,7 @@ class TestTheFile:
         path.parent.unlink()
         hold.keep(loop())
         assert ArmHold(path).held, "a disk that was full takes it later"
-        hold.follow(loop(), Flag.ARMED, running())
+        hold.follow(loop(), Flag.ARMED, running(), False)
         assert not ArmHold(path).held
 
     def test_a_file_that_nobody_can_look_for_holds(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
