@@ -25,6 +25,7 @@ from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.walls import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, DeviceNotFoundError, DriverError, HapticdError, PluginError
+from hapticd.loop.force_mark import ForceMark
 from hapticd.loop.loop import ControlLoop
 from hapticd.loop.memory import DEVICE_LOST, FORCE_LEFT, GO, SUPERVISOR_BEAT, SharedMemory
 from hapticd.loop.realtime import become_realtime, die_with_parent, leave_realtime, sleep_until
@@ -44,6 +45,7 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--socket", type=int, required=True)
     parser.add_argument("--parent", type=int, required=True)
+    parser.add_argument("--mark", type=int, required=True)
     arguments = parser.parse_args()
     # An interrupt of the terminal and `systemctl kill -s HUP` go to every process; the supervisor alone decides what
     # they mean.
@@ -68,6 +70,8 @@ def main() -> int:
     except ConnectionError:
         return 1  # the supervisor is gone
     ended = 0
+    mark = ForceMark(arguments.mark)
+    mark.set()
     try:
         control.run()
     except DriverError as error:  # the event says why
@@ -78,7 +82,9 @@ def main() -> int:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd and the supervisor both send one; it is over
         leave_realtime()
     force_left = control.session.driver.force_left
-    if force_left:
+    if not force_left:
+        mark.clear()
+    else:
         sys.stderr.write(f"the driver could not take the force away: {force_left}\n")
     return FORCE_LEFT if force_left else ended
 

@@ -20,6 +20,7 @@ from hapticd.config.loading import LoadedConfig
 from hapticd.config.walls import MAX_WALLS
 from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, HapticdError
+from hapticd.loop.force_mark import ForceMark
 from hapticd.loop.memory import (
     DEVICE_LOST,
     FORCE_LEFT,
@@ -195,6 +196,7 @@ class LoopStart:
     Args:
         config: what it is to run.
         rescue: called with why the force has to be taken away from outside, where this did not end by itself without.
+        mark: says whether it may have left a force.
         resume: where the loop before stopped, when this one goes on for it.
         wait: it gets ready, and does not touch the device before `go`.
     """
@@ -203,6 +205,7 @@ class LoopStart:
         self,
         config: LoadedConfig,
         rescue: Callable[[str], None],
+        mark: ForceMark,
         resume: ResumeState = FROM_START,
         *,
         wait: bool = False,
@@ -223,10 +226,11 @@ class LoopStart:
                 [
                     *(sys.executable, "-P", "-m", "hapticd.loop.process"),
                     *("--socket", str(theirs.fileno()), "--parent", str(os.getpid())),
+                    *("--mark", str(mark.descriptor)),
                 ],
                 stdin=file,
                 stdout=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
+                pass_fds=[theirs.fileno(), mark.descriptor],
                 start_new_session=True,
             )
         if not wait:

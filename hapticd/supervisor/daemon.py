@@ -91,7 +91,7 @@ class Daemon:
             remote.prepare(config)
             hold = ArmHold(hold_file(instance))
             # both import what they need at the same time
-            start = LoopStart(config, self._rescue, hold.resume(config), wait=True)
+            start = LoopStart(config, self._rescue, self.release.mark, hold.resume(config), wait=True)
             with contextlib.ExitStack() as on_the_way:
                 on_the_way.callback(start.end)
                 self.release.wait_ready()  # before there can be a force to take away; if it is not, that is said later
@@ -113,7 +113,7 @@ class Daemon:
                 config=config,
                 loop=loop,
                 requests=RequestQueue(loop.shared),
-                recovery=Recovery(self._rescue),
+                recovery=Recovery(self._rescue, self.release.mark),
                 release=self.release,
                 publisher=publisher,
                 commands=commands,

@@ -5,8 +5,8 @@ everything imported, since the device holds its last force until it is released,
 be most of that time. A byte on its standard output says that it is ready; it then reads its standard input to the end:
 lines that name the device, and a mark which means release. Without the mark the supervisor has died, for who does not
 need it any more kills it. The loop lets go at that death by itself; where it is stopped or hangs, it is killed and the
-device released. Where the loop is a real-time process so is this, so that a computer with more work than processors
-does not make it late.
+device released, and so it is where the loop has died before it let go. Where the loop is a real-time process so is
+this, so that a computer with more work than processors does not make it late.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from typing import Any
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.driver import Driver
 from hapticd.errors import DeviceNotFoundError
+from hapticd.loop.force_mark import ForceMark
 from hapticd.loop.realtime import become_realtime
 from hapticd.loop.resume import identity
 from hapticd.supervisor.orphans import kill_orphans
@@ -57,14 +58,16 @@ class ForceRelease:
         config: names the device; what of it a reload may change is of no matter here.
 
     Attributes:
+        mark: says whether a loop may have left a force.
         force_left: why a force may be left since the last release, a line for people; "" when there is none.
     """
 
     def __init__(self, config: LoadedConfig) -> None:
         self.force_left = ""
+        self.mark = ForceMark()
         self._config = config
         self._device = ""
-        self._helper, self._ready = _start(config), False
+        self._helper, self._ready = _start(config, self.mark), False
         self._ready_by_s = time.monotonic() + READY_TIMEOUT_S
 
     @property
@@ -110,6 +113,8 @@ class ForceRelease:
             What came of it, a line for people.
         """
         said, released = self._release()
+        if released:
+            self.mark.clear()
         self.force_left = "" if released else said
         return said
 
@@ -164,7 +169,7 @@ class ForceRelease:
             OSError: no process can be started.
         """
         self.close()
-        self._helper, self._ready = _start(self._config), False
+        self._helper, self._ready = _start(self._config, self.mark), False
         self._tell()
         self._ready_by_s = time.monotonic() + READY_TIMEOUT_S
 
@@ -175,7 +180,7 @@ class ForceRelease:
             self._helper.communicate(timeout=TIMEOUT_S)
 
 
-def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
+def _start(config: LoadedConfig, mark: ForceMark) -> subprocess.Popen[bytes]:
     with os.fdopen(os.memfd_create("configuration"), "w+b") as file:
         file.write(config.text.encode())
         file.seek(0)
@@ -183,11 +188,12 @@ def _start(config: LoadedConfig) -> subprocess.Popen[bytes]:
             [
                 *(sys.executable, "-P", "-m", "hapticd.supervisor.force_release"),
                 *("--config", str(file.fileno()), "--parent", str(os.getpid())),
+                *("--mark", str(mark.descriptor)),
             ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            pass_fds=[file.fileno()],
+            pass_fds=[file.fileno(), mark.descriptor],
             bufsize=0,
             start_new_session=True,
         )
@@ -214,6 +220,7 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--config", type=int, required=True)
     parser.add_argument("--parent", type=int, required=True)
+    parser.add_argument("--mark", type=int, required=True)
     arguments = parser.parse_args()
     try:
         with os.fdopen(arguments.config, "rb") as file:
@@ -226,7 +233,7 @@ def main() -> int:
         os.write(sys.stdout.fileno(), b"r")
         *named, mark = sys.stdin.buffer.read().split(b"\n")
         if mark != _RELEASE:
-            if not kill_orphans(arguments.parent):
+            if not (kill_orphans(arguments.parent) or ForceMark(arguments.mark).is_set):
                 return 0
             signal.setitimer(signal.ITIMER_REAL, TIMEOUT_S)  # ends this; no one is left who would, if the driver hangs
         problem = _let_go(driver, json.loads(named[-1]) if named else "")

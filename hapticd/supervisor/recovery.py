@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hapticd.config.loading import LoadedConfig
 from hapticd.errors import HapticdError
+from hapticd.loop.force_mark import ForceMark
 from hapticd.loop.resume import FROM_START, ResumeState, left_by
 from hapticd.supervisor.child import LoopProcess, LoopStart
 
@@ -29,6 +30,7 @@ class Recovery:
     Args:
         rescue: called with why the force has to be taken away from outside, where a try did not end by itself, or the
             loop that lost the device did not let go of it.
+        mark: says whether a loop may have left a force.
 
     Attributes:
         lost: the device is being looked for.
@@ -38,8 +40,9 @@ class Recovery:
         resume: what the next loop goes on from.
     """
 
-    def __init__(self, rescue: Callable[[str], None]) -> None:
+    def __init__(self, rescue: Callable[[str], None], mark: ForceMark) -> None:
         self._rescue = rescue
+        self._mark = mark
         self.lost = False
         self.lost_s = 0.0
         self.next_try_s = 0.0
@@ -84,7 +87,7 @@ class Recovery:
         try:
             if self._start is None:
                 if now_s >= self.next_try_s:
-                    self._start = LoopStart(config, self._rescue, self.resume)
+                    self._start = LoopStart(config, self._rescue, self._mark, self.resume)
                 return None
             control = self._start.poll()
             if control is None:

@@ -88,7 +88,7 @@ def made(status: StatusBuilder, loop: LoopProcess, recovery: Recovery) -> Status
 
 def test_a_device_is_calibrated_once_a_record_says_so_and_not_before(loop: LoopProcess) -> None:
     """T12: before the first record, a rig that did not know where it was was said to be calibrated."""
-    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock())
+    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock(), Mock())
     assert not made(status, loop, recovery).calibrated
     status.add([record(Flag.UNCALIBRATED)])
     assert not made(status, loop, recovery).calibrated
@@ -99,7 +99,7 @@ def test_a_device_is_calibrated_once_a_record_says_so_and_not_before(loop: LoopP
 
 
 def test_a_device_that_is_lost_is_not_calibrated_until_the_next_loop_says_so(loop: LoopProcess) -> None:
-    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock())
+    status, recovery = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock(), Mock())
     status.add([record(Flag.ARMED)])
     assert made(status, loop, recovery).armed
     recovery.lost, recovery.resume = True, replace(FROM_START, latched=True, law=3)
@@ -115,7 +115,7 @@ def test_the_rate_is_that_of_the_ticks_and_not_of_when_they_were_fetched(
     loop: LoopProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A supervisor that gets no processor fetches the ticks of 0.6 s late, and those of 0.9 s at once."""
-    status, recovery, now_s = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock()), 100.0
+    status, recovery, now_s = StatusBuilder("default", 0, Path("/lab.toml")), Recovery(Mock(), Mock()), 100.0
     monkeypatch.setattr("time.monotonic", lambda: now_s)
     rates = []
     for passed_s, ticks in ((0.6, range(600)), (0.6, range(600, 700)), (0.6, range(700, 1600)), (0.6, range(0))):
@@ -135,7 +135,7 @@ def test_a_fault_after_a_suspend_has_the_time_that_the_clock_tells_then(loop: Lo
     assert event_log.recorder.close(5, 10.0) == ""
     (path,) = FaultStore(tmp_path).paths()
     assert read_header(path)["event"]["timestamp"] == 3602.0
-    assert made(status, loop, Recovery(Mock())).fault_timestamp == 3602.0
+    assert made(status, loop, Recovery(Mock(), Mock())).fault_timestamp == 3602.0
 
 
 def test_who_comes_once_it_is_ready_finds_no_status_of_before_the_first_tick(tmp_path: Path) -> None:

@@ -13,8 +13,9 @@ import pytest
 
 from hapticd.loop.memory import RECORDS, SharedMemory
 from hapticd.supervisor.orphans import kill_orphans
+from hapticd.tick.event import EventCode
 from tests.daemon.running import Daemon, gone, wait_until
-from tests.faults.rig import Rig
+from tests.faults.rig import Rig, anew_where_late, events_until
 
 HELPER = b"hapticd.supervisor.force_release"
 
@@ -65,6 +66,36 @@ def test_a_device_that_the_loop_has_let_go_of_is_left_alone() -> None:
         assert rig.released().force_n == 0.0
         wait_until(lambda: gone(helper), "the end of the helper")
         assert rig.felt().opened == 0
+
+
+@anew_where_late
+@pytest.mark.parametrize("loop_first", [True, False])
+def test_a_loop_that_is_killed_with_its_supervisor_leaves_no_force(loop_first: bool) -> None:
+    """There was no loop left to be killed, which the helper took for one that had let go."""
+    with Rig() as rig:
+        rig.pressed()
+        rig.order("")
+        control, helper = rig.daemon.control_pid(), helper_pid(rig.daemon)
+        pids = [control, rig.daemon.process.pid]
+        for pid in pids if loop_first else reversed(pids):
+            os.kill(pid, signal.SIGKILL)
+        rig.daemon.process.wait()
+        assert rig.released().opened == 1
+        assert rig.felt().force_n == 0.0
+        wait_until(lambda: gone(helper), "the end of the helper")
+
+
+@anew_where_late
+def test_what_the_supervisor_has_seen_to_no_helper_sees_to_again() -> None:
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        rig.order("unplugged")
+        events_until(subscriber, EventCode.DEVICE_LOST)
+        helper = helper_pid(rig.daemon)
+        opened = rig.felt().opened
+        rig.daemon.process.kill()
+        rig.daemon.process.wait()
+        wait_until(lambda: gone(helper), "the end of the helper")
+        assert rig.felt().opened == opened
 
 
 HANGING = """

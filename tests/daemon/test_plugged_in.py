@@ -70,7 +70,7 @@ def test_a_device_that_has_been_away_for_long_is_tried_when_something_is_plugged
     lost: Any = SimpleNamespace(
         exit_code=0, force_seen_to=True, shared=SimpleNamespace(words=defaultdict(int)), info=info
     )
-    looking = Recovery(Mock())
+    looking = Recovery(Mock(), Mock())
     nothing: Any = None
     looking.begin(lost, "unplugged")
     for _ in range(8):  # time after time in vain

@@ -68,7 +68,7 @@ def looking(monkeypatch: pytest.MonkeyPatch) -> tuple[Recovery, list[UnderWay]]:
         return tries[-1]
 
     monkeypatch.setattr(recovery, "LoopStart", start)
-    made = Recovery(Mock())
+    made = Recovery(Mock(), Mock())
     made.begin(LOST, "unplugged")
     try_now(made)
     return made, tries
@@ -152,7 +152,7 @@ def test_who_disarms_a_device_that_is_lost_hears_once_it_is_known_what_became_of
     left: str,
 ) -> None:
     """It was answered with ok at once, with the loop still hanging in its driver and the force on the hand."""
-    made = Recovery(Mock())
+    made = Recovery(Mock(), Mock())
     made.begin(LOST, "silent")
     verdicts: list[str] = []
     asked = [({"do": "disarm"}, lambda _ok, verdict: verdicts.append(verdict), "a test")]
@@ -232,7 +232,7 @@ class Lost:
         monkeypatch.setattr(recovery, "HotplugWatch", lambda: SimpleNamespace(news=self._news))
         monkeypatch.setattr(recovery, "LoopStart", self._refuse)
         self.rescue = Mock()
-        self.made = Recovery(self.rescue)
+        self.made = Recovery(self.rescue, Mock())
         self.tries_s: list[float] = []
 
     def _news(self) -> bool:
@@ -400,7 +400,7 @@ def test_what_was_plugged_in_before_the_device_was_lost_is_no_news(
 ) -> None:
     monkeypatch.setattr(recovery, "PLACES", (tmp_path,))
     monkeypatch.setattr(recovery, "LoopStart", UnderWay)
-    made = Recovery(Mock())
+    made = Recovery(Mock(), Mock())
     (tmp_path / "another").touch()
     made.begin(LOST, "unplugged")
     made.next_try_s = due_s = made.next_try_s + 100.0

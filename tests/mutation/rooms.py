@@ -143,9 +143,12 @@ ROOMS = {
         for name in ("cycle_sums", "felt_mass")
     },
     "recovery": Room(
-        ("hapticd/supervisor/recovery.py", "hapticd/loop/resume.py", "hapticd/loop/sources.py"),
         (
-            *(f"tests/daemon/test_{name}.py" for name in ("recovery", "plugged_in", "edited")),
+            *("hapticd/supervisor/recovery.py", "hapticd/loop/resume.py"),
+            *("hapticd/loop/sources.py", "hapticd/loop/force_mark.py"),
+        ),
+        (
+            *(f"tests/daemon/test_{name}.py" for name in ("recovery", "plugged_in", "edited", "orphans")),
             "tests/loop/test_leaving.py",
         ),
     ),
