@@ -10,7 +10,6 @@ The protocol behind it is docs/remote.md; any language with ZeroMQ and msgpack c
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Sequence
@@ -44,6 +43,7 @@ class DrivenState:
     Attributes:
         force_n: its force on the device, one element an axis [N].
         impulse_n_s: what pulls at the target, summed over time since the daemon has it [N s].
+        since_ns: since when that is, on the daemon's CLOCK_MONOTONIC; another number: the sum began anew [ns].
         target_m: where the target or the object was in this tick, behind what was sent for it by the limits [m].
         seq: the client's number of the message in force; -1 when there is none.
         age_s: how old what it says was: since it was sent, or the daemon took it where that is not known [s].
@@ -58,6 +58,7 @@ class DrivenState:
     age_s: float
     state: str
     work_j: float
+    since_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,10 +246,9 @@ class RemotePort:
         if now is None or now.port is None or now is since:
             return self._mean_n or (0.0,) * len(self.axes)
         self._since = now
-        span_s = (now.deadline_ns - since.deadline_ns) * 1e-9 if since is not None else math.inf
-        if since is None or since.port is None or not 0.0 < span_s <= LONGEST_MEAN_S or since.seq >= now.seq:
-            self._mean_n = now.port.force_n
-        else:
+        self._mean_n = now.port.force_n
+        span_s = (now.deadline_ns - since.deadline_ns) * 1e-9 if since and since.seq < now.seq else 0.0
+        if since and since.port and since.port.since_ns == now.port.since_ns and 0.0 < span_s <= LONGEST_MEAN_S:
             pairs = zip(now.port.impulse_n_s, since.port.impulse_n_s, strict=True)
             self._mean_n = tuple((after - before) / span_s for after, before in pairs)
         return self._mean_n

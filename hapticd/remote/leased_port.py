@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -53,6 +54,7 @@ class LeasedPort:
         lease_s: how long a client that says nothing keeps it [s].
         update: all that its owner has said, or the last one where it has none.
         owner: the client that it belongs to; None: to none.
+        since_ns: since when the loop has it, and sums what it does [ns of CLOCK_MONOTONIC].
         messages: taken.
         late: messages that were passed over: behind a newer one, older than `hold_s`, or of a client that had gone.
         refused: messages that were not taken.
@@ -65,6 +67,7 @@ class LeasedPort:
         self.lease_s = lease_s
         self.update = Update() if update is None else update
         self.owner: Sender | None = None
+        self.since_ns = time.monotonic_ns()
         self.messages = 0
         self.late = 0
         self.refused = 0

@@ -98,9 +98,8 @@ class RemoteServer:
 
     def run(self) -> None:
         """Serve until the supervisor has gone."""
-        scene = self._scene.descriptor
         channel = self._channel.fileno()
-        waiting = [scene, channel]
+        waiting = [self._scene.descriptor, channel]
         while True:
             more = self._scene.receive()
             looked_ns = time.monotonic_ns()
@@ -139,7 +138,7 @@ class RemoteServer:
         # A list that is another one by now may have been it already in these ticks.
         known = self._scene.ports if self._memory.slots.in_force else {}
         if self._state.subscribed:
-            names = tuple(known)
+            names = [(name, port.since_ns) for name, port in known.items()]
             for record in records[-_MOST_BEHIND:]:
                 self._state.send(state_map(record, names, self._settings.epoch_offset_ns))
         ports = list(known.values())

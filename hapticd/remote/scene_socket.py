@@ -162,9 +162,8 @@ class SceneSocket:
         port = self.ports.get(name) if isinstance(name, str) else None
         if port is None:
             self.strays += 1
-            known = ", ".join(self.ports) or "nothing"
-            refusal = Refusal(str(name)[:40], f"no such name in the scene; there is {known}")
-            self._refusals.add(identity, refusal, now_ns)
+            text = f"no such name in the scene; there is {', '.join(self.ports) or 'nothing'}"
+            self._refusals.add(identity, Refusal(str(name)[:40], text), now_ns)
             return
         sender = self._sender(port, identity, descriptor, frame)
         if fields.get("release") is not True and has_ended(sender.descriptor, sender.inode):
@@ -216,6 +215,4 @@ def _decoded(sent: bytes) -> dict[str, Any] | None:
         said = msgpack.unpackb(sent)
     except Exception:  # noqa: BLE001 - msgpack has many ways to say that bytes make no sense
         return None
-    if not isinstance(said, dict) or not all(isinstance(key, str) for key in said):
-        return None
-    return said
+    return said if isinstance(said, dict) and all(isinstance(key, str) for key in said) else None

@@ -13,12 +13,12 @@ from hapticd.tick.remote.port_state import PortState
 _ARMED = int(Flag.ARMED)
 
 
-def state_map(record: TickRecord, names: Sequence[str], epoch_offset_ns: int) -> dict[str, Any]:
+def state_map(record: TickRecord, names: Sequence[tuple[str, int]], epoch_offset_ns: int) -> dict[str, Any]:
     """What clients are told of a tick.
 
     Args:
         record: it.
-        names: of its ports, in their order; empty while they are not known.
+        names: of its ports, in their order, with since when each is summed [ns]; empty while they are not known.
         epoch_offset_ns: what to add to CLOCK_MONOTONIC to get nanoseconds since the epoch.
     """
     state: dict[str, Any] = {
@@ -31,7 +31,7 @@ def state_map(record: TickRecord, names: Sequence[str], epoch_offset_ns: int) ->
         "velocity_m_per_s": record.velocity_m_per_s,
         "force_n": record.force_n,
         "buttons": record.buttons,
-        "ports": {names[port.index]: _port_map(port) for port in ports_of(record) if port.index < len(names)},
+        "ports": dict([_named(port, *names[port.index]) for port in ports_of(record) if port.index < len(names)]),
     }
     if record.orientation:
         state["orientation"] = record.orientation
@@ -43,8 +43,9 @@ def ports_of(record: TickRecord) -> Sequence[PortRecord]:
     return record.ports.shown if record.ports is not None else ()
 
 
-def _port_map(port: PortRecord) -> dict[str, Any]:
-    return {
+def _named(port: PortRecord, name: str, since_ns: int) -> tuple[str, dict[str, Any]]:
+    return name, {
+        "since_ns": since_ns,
         "force_n": port.force_n,
         "impulse_n_s": port.impulse_n_s,
         "target_m": port.target_m,

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import zmq
 
+import hapticd
 from hapticd.client import ClientError, RefusedError, RemotePort
 from hapticd.loop.memory import SKIPPED
 from hapticd.remote.state_map import ports_of
@@ -106,6 +107,24 @@ def test_the_mean_force_is_that_of_the_ticks_in_between_whatever_was_lost(daemon
     held_n = [record.force_n[0] for record in between]
     assert len(between) > 0.9 * (last.seq - first.seq)
     assert mean_n[0] == pytest.approx(sum(held_n) / len(held_n), abs=0.05 * MAX_FORCE_N)
+
+
+def test_a_mean_force_has_nothing_of_a_sum_that_began_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was -72 N of a coupling that gives 3 N: what it had summed before it was taken away was taken off."""
+    with Daemon(FIRM).wait_ready() as daemon, driven(daemon) as tool:
+        monkeypatch.setenv("HAPTICD_RUNTIME_DIR", str(daemon.directory / "run"))
+        hold(tool, 0.02, 1500)
+        assert tool.mean_force_n()[0] > 0.5 * MAX_FORCE_N
+        before = tool._newest
+        with hapticd.connect() as client:
+            for text in (FIRM.replace('"tool"', '"other"'), FIRM):
+                daemon.config.write_text(text)
+                client.reload()
+        assert before is not None
+        assert before.port is not None
+        most_n_s = before.port.impulse_n_s[0]
+        wait_until(lambda: (port := tool.state(20.0).port) is not None and port.impulse_n_s[0] < most_n_s, "a new sum")
+        assert abs(tool.mean_force_n()[0]) <= MAX_FORCE_N * (1.0 + 1e-6)
 
 
 def test_a_client_that_is_killed_is_told_once_let_go_without_a_step_and_replaced() -> None:

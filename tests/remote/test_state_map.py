@@ -31,7 +31,9 @@ def record(*ports: PortRecord, flags: int = 0, orientation: tuple[float, ...] = 
 
 
 def test_a_tick_is_told_with_all_that_was_in_it() -> None:
-    told = state_map(record(port(0, 10.0), port(1, 20.0), flags=int(Flag.ARMED)), ["tool", "field"], 500_000_000)
+    told = state_map(
+        record(port(0, 10.0), port(1, 20.0), flags=int(Flag.ARMED)), [("tool", 3), ("field", 4)], 500_000_000
+    )
     ports = told.pop("ports")
     assert told == {
         "seq": 41,
@@ -45,6 +47,7 @@ def test_a_tick_is_told_with_all_that_was_in_it() -> None:
         "buttons": 5,
     }
     assert ports["field"] == {
+        "since_ns": 4,
         "target_m": (20.0,),
         "force_n": (20.1,),
         "impulse_n_s": (20.2,),
@@ -63,11 +66,11 @@ def test_a_device_that_turns_is_told_with_its_orientation_and_another_flag_is_no
 
 
 def test_a_port_whose_name_is_not_known_yet_is_not_told() -> None:
-    assert state_map(record(port(0, 1.0), port(1, 2.0)), ["tool"], 0)["ports"].keys() == {"tool"}
+    assert state_map(record(port(0, 1.0), port(1, 2.0)), [("tool", 3)], 0)["ports"].keys() == {"tool"}
     assert state_map(record(port(0, 1.0)), [], 0)["ports"] == {}
     none = record()
     none.ports = None
-    assert state_map(none, ["tool"], 0)["ports"] == {}
+    assert state_map(none, [("tool", 3)], 0)["ports"] == {}
 
 
 def test_a_delay_is_counted_from_its_edge_on() -> None:
