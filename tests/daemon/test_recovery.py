@@ -47,7 +47,7 @@ from tests.daemon.running import wait_until
 class UnderWay:
     """A start that takes its time."""
 
-    def __init__(self, config: Any, _rescue: object, resume: ResumeState) -> None:
+    def __init__(self, config: Any, _rescue: object, _mark: object, resume: ResumeState) -> None:
         self.config = config
         self.resume = resume
         self.ended = False
