@@ -116,7 +116,7 @@ class Machine:
                 command = (entry / "cmdline").read_bytes().split(b"\0")
                 if inside == main:
                     supervisor = int(entry.name)
-                elif b"hapticd.loop.process" in command and command[-2].decode() == main:
+                elif b"hapticd.loop.process" in command and command[command.index(b"--parent") + 1].decode() == main:
                     control = int(entry.name)
         assert supervisor
         assert control, self.journal()
