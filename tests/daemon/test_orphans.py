@@ -75,9 +75,12 @@ def test_a_loop_that_is_killed_with_its_supervisor_leaves_no_force(loop_first: b
     with Rig() as rig:
         rig.pressed()
         rig.order("")
+        wait_until(lambda: rig.felt().opened == 0, "what is felt to begin anew")
         control, helper = rig.daemon.control_pid(), helper_pid(rig.daemon)
-        pids = [control, rig.daemon.process.pid]
-        for pid in pids if loop_first else reversed(pids):
+        pids = [rig.daemon.process.pid, control]
+        for pid in pids:  # or the second may have let go by the time that it is killed
+            os.kill(pid, signal.SIGSTOP)
+        for pid in reversed(pids) if loop_first else pids:
             os.kill(pid, signal.SIGKILL)
         rig.daemon.process.wait()
         assert rig.released().opened == 1
