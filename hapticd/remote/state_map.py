@@ -31,7 +31,11 @@ def state_map(record: TickRecord, names: Sequence[tuple[str, int]], epoch_offset
         "velocity_m_per_s": record.velocity_m_per_s,
         "force_n": record.force_n,
         "buttons": record.buttons,
-        "ports": dict([_named(port, *names[port.index]) for port in ports_of(record) if port.index < len(names)]),
+        "ports": {
+            names[port.index][0]: _port_map(port, names[port.index][1])
+            for port in ports_of(record)
+            if port.index < len(names)
+        },
     }
     if record.orientation:
         state["orientation"] = record.orientation
@@ -43,8 +47,8 @@ def ports_of(record: TickRecord) -> Sequence[PortRecord]:
     return record.ports.shown if record.ports is not None else ()
 
 
-def _named(port: PortRecord, name: str, since_ns: int) -> tuple[str, dict[str, Any]]:
-    return name, {
+def _port_map(port: PortRecord, since_ns: int) -> dict[str, Any]:
+    return {
         "since_ns": since_ns,
         "force_n": port.force_n,
         "impulse_n_s": port.impulse_n_s,

@@ -94,6 +94,13 @@ def test_what_was_armed_arms_itself_again(end: Any) -> None:
         assert HELD not in rig.daemon.output()
 
 
+def waits(rig: Rig) -> None:
+    """It is disarmed, and says why."""
+    status = rig.ask("status")["status"]
+    assert not status["armed"]
+    assert EDITED in str(status["warnings"])
+
+
 def edit(rig: Rig) -> None:
     rig.daemon.config.write_text(rig.daemon.config.read_text() + "# edited\n")
 
@@ -105,12 +112,11 @@ def test_what_was_edited_since_a_daemon_died_arms_itself_only_once_somebody_asks
         rig.pressing()
         armed(rig)
         edit(rig)
-        for _ in range(2):  # also one that dies once more
-            rig.daemon.again()
-            status = rig.ask("status")["status"]
-            assert (status["armed"], EDITED in str(status["warnings"])) == (False, True)
-            armed(rig)
         rig.daemon.again()
+        waits(rig)
+        armed(rig)
+        rig.daemon.again()
+        waits(rig)  # also one that dies once more
         rig.goes_on("arm")
         assert EDITED not in str(rig.ask("status")["status"]["warnings"])
         armed(rig)
@@ -143,8 +149,7 @@ def test_a_first_arm_that_was_only_saved_and_not_asked_for_waits_for_it_after_a_
         for _ in range(2):
             armed(rig)
             rig.daemon.again()
-            status = rig.ask("status")["status"]
-            assert (status["armed"], EDITED in str(status["warnings"])) == (False, True)
+            waits(rig)
         rig.goes_on("arm")
 
 
@@ -160,8 +165,7 @@ def test_what_was_tared_arms_itself_only_once_somebody_asks_after_a_crash() -> N
             assert any(subscriber.until("hapticd/status", armed=True)["origin_m"])
         armed(rig)
         rig.daemon.again()
-        status = rig.ask("status")["status"]
-        assert (status["armed"], EDITED in str(status["warnings"])) == (False, True)
+        waits(rig)
         rig.goes_on("arm")
         armed(rig)
         rig.daemon.again()

@@ -65,7 +65,7 @@ def test_friction_holds_alike_to_all_sides(law: str) -> None:
 @pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
 @pytest.mark.parametrize("way_m", [1e-4, -1e-4, -3e-4])
 def test_a_stroke_over_a_rough_surface_meets_its_cone_and_no_more_from_the_touch_on(way_m: float, law: str) -> None:
-    """Laws damped it by the speed of the hand: under the default one, one way, 9.2 N of 1.2, as if the hand arrived."""
+    """Laws damped it by the speed of the hand: under the default one, one way, with 9.2 N where friction allows 1.5."""
     rig = Rig(f"{ROUGH}dynamic_friction = 0.4\n", law, info=REAL).start((0.0, 0.0, 0.002)).to((0.0, 0.0, 0.001), 60)
     for n in range(200):
         z_m = max(0.001 - 3e-5 * n, -0.0015)
