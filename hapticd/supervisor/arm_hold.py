@@ -28,7 +28,7 @@ class ArmHold:
     A daemon that dies is started again by systemd, and `safety.auto_arm` would put forces on that somebody has just
     taken away, or that somebody has edited and not asked for, or at a wall that a tare had put elsewhere. So another
     file, `armed`, says with what the device was last armed or could have been by itself, until an orderly end.
-    Simulated devices push on nobody, and are not held.
+    Simulated devices are not held.
 
     Args:
         path: of the file.
@@ -60,7 +60,7 @@ class ArmHold:
                 if text_hash != config.sha256:
                     raise ValueError(text_hash)
                 law_code, port_law_code, fields = map(int, codes)
-            except (HapticdError, OSError, ValueError):  # edited, or nobody knows
+            except (HapticdError, OSError, ValueError):  # edited, or not readable
                 self.inherited = self.inherited or EDITED
         return ResumeState(may_arm=not self.inherited, law_code=law_code, port_law_code=port_law_code, fields=fields)
 
@@ -134,7 +134,7 @@ class ArmHold:
 
 
 def _is_there(path: Path) -> bool:
-    """Whether a file, or anything else, lies at a path, or nobody knows."""
+    """Whether anything lies at a path; True also where that cannot be found out."""
     try:
         path.lstat()
     except OSError as error:
