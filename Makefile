@@ -99,7 +99,7 @@ nightly: packages web clients $(READY)
 REPEAT ?= 50
 REPEAT_WORKERS ?= 5
 REPEAT_TESTS ?= tests/daemon tests/client tests/cli tests/drivers tests/faults tests/telemetry tests/views tests/remote \
-    tests/doctor tests/driven tests/your_simulator tests/service/test_systemd.py tests/test_readme.py \
+    tests/doctor tests/driven tests/your_simulator tests/benchmarks tests/service/test_systemd.py tests/test_readme.py \
     tests/test_bridges_page.py tests/test_python_page.py
 repeat: web clients $(READY)
 	REPEAT=$(REPEAT) $(BIN)/pytest $(REPEAT_TESTS) --numprocesses $(REPEAT_WORKERS) --dist load --maxschedchunk 1 \

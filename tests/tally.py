@@ -19,17 +19,28 @@ STEPS = (50, 20, 10, 2, 1, 0)
 
 @dataclass
 class Count:
-    """What has come of a test: runs that passed since it failed last, runs that failed, whether a daemon ran for it."""
+    """What has come of a test: runs that passed since it failed last, runs that failed, whether a daemon ran for it.
+
+    The first two are of its version; `in_a_row` are the runs that passed since it failed last in any version.
+    """
 
     passes: int = 0
     failures: int = 0
     daemon: bool = False
+    in_a_row: int = 0
 
-    def add(self, passed: bool, daemon: bool) -> None:
-        """One more run."""
-        self.passes = self.passes + 1 if passed else 0
-        self.failures += not passed
+    @property
+    def ran(self) -> bool:
+        """Whether the test has run in this version."""
+        return self.passes > 0 or self.failures > 0
+
+    def add(self, passed: bool, daemon: bool, *, same: bool = True) -> None:
+        """One more run, of the same version or another."""
+        self.in_a_row = self.in_a_row + 1 if passed else 0
         self.daemon |= daemon
+        if same:
+            self.passes = self.passes + 1 if passed else 0
+            self.failures += not passed
 
 
 def opened() -> Tally:
@@ -38,7 +49,7 @@ def opened() -> Tally:
 
 
 class Tally:
-    """The runs of each test in the version that it has now; what the file has of others counts for nothing.
+    """The runs of each test in the version that it has now; others only count for what has passed in a row.
 
     Args:
         path: the file.
@@ -81,18 +92,16 @@ class Tally:
         return count.passes >= (times if count.daemon else 1)
 
     def begun(self) -> bool:
-        """Whether any test has run."""
-        return bool(self._counts)
+        """Whether any test has run in this version."""
+        return any(count.ran for count in self._counts.values())
 
     def lines(self) -> list[str]:
         """How many tests that start a daemon have passed how often, by all processes, and every test that failed."""
-        counts = self._read()
-        often = [count.passes for count in counts.values() if count.daemon]
-        said = [f"{len(often)} tests start a daemon; runs that passed in a row beside a busy processor:"]
-        for step, above in zip(STEPS, (float("inf"), *STEPS), strict=False):
-            tests = sum(step <= passes < above for passes in often)
-            if tests:
-                said.append(f"  {step} or more: {tests} tests")
+        counts = {test: count for test, count in self._read().items() if count.ran}
+        with_one = [count for count in counts.values() if count.daemon]
+        said = [f"{len(with_one)} tests start a daemon; runs that passed in a row beside a busy processor:"]
+        said += _steps([count.passes for count in with_one])
+        said += ["those of other versions with them:", *_steps([count.in_a_row for count in with_one])]
         failed = {test: count for test, count in counts.items() if count.failures}
         said.append(f"{len(failed)} tests have failed")
         said += [f"  {test}: {count.failures} times, then passed {count.passes}" for test, count in failed.items()]
@@ -104,13 +113,24 @@ class Tally:
             for line in file.read_text().splitlines() if file is not None and file.exists() else ():
                 run = json.loads(line)
                 test = run["test"]
-                if run["version"] != self._version(test):
-                    continue
-                if "passes" in run:
-                    counts[test] = Count(run["passes"], run["failures"], run["daemon"])
+                same = run["version"] == self._version(test)
+                if "passed" in run:
+                    counts.setdefault(test, Count()).add(run["passed"], run["daemon"], same=same)
+                elif same:
+                    counts[test] = Count(run["passes"], run["failures"], run["daemon"], run["in_a_row"])
                 else:
-                    counts.setdefault(test, Count()).add(run["passed"], run["daemon"])
+                    counts[test] = Count(daemon=run["daemon"], in_a_row=run["in_a_row"])
         return counts
+
+
+def _steps(often: list[int]) -> list[str]:
+    """How many of these numbers are of each step, those without any left out."""
+    said = []
+    for step, above in zip(STEPS, (float("inf"), *STEPS), strict=False):
+        tests = sum(step <= passes < above for passes in often)
+        if tests:
+            said.append(f"  {step} or more: {tests} tests")
+    return said
 
 
 if __name__ == "__main__":

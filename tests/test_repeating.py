@@ -125,6 +125,26 @@ def test_what_is_kept_goes_on_counting_on_another_computer(tmp_path: Path) -> No
     assert Tally(tmp_path / "last", lambda test: "two", kept).passes("test_it") == 0
 
 
+def test_what_other_versions_have_passed_since_a_failure_is_said_besides(tmp_path: Path) -> None:
+    def opened(version: str) -> Tally:
+        return Tally(tmp_path / "tally", lambda test: version, tmp_path / "kept")
+
+    for version, passed in (("one", True), ("one", False), ("one", True), ("two", True), ("three", True)):
+        tally = opened(version)
+        tally.add("test_it", passed=passed, daemon=True)
+        if version != "three":
+            tally.keep()
+    assert opened("three").lines() == [
+        "1 tests start a daemon; runs that passed in a row beside a busy processor:",
+        "  1 or more: 1 tests",
+        "those of other versions with them:",
+        "  2 or more: 1 tests",
+        "0 tests have failed",
+    ]
+    unbegun = opened("four")
+    assert (unbegun.begun(), unbegun.done("test_it", 1)) == (False, False)
+
+
 @pytest.mark.parametrize(("begun", "code"), [(True, pytest.ExitCode.OK), (False, pytest.ExitCode.NO_TESTS_COLLECTED)])
 def test_that_all_have_run_often_enough_is_no_failure(tmp_path: Path, begun: bool, code: pytest.ExitCode) -> None:
     tally = Tally(tmp_path / "tally", lambda test: "one")
