@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,6 +31,11 @@ def watched(place: Path, text: str) -> Iterator[Terminal]:
         terminal.close()
 
 
+def words(pid: str) -> list[bytes]:
+    """The command line of a process."""
+    return Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+
+
 def test_from_one_command_to_a_live_view_and_back(tmp_path: Path) -> None:
     text = CONFIG.read_text().replace('tcp = "tcp://127.0.0.1:9872"', "")
     with watched(tmp_path, text) as terminal:
@@ -45,6 +51,15 @@ def test_a_daemon_that_cannot_start_says_why_and_ends_the_view(tmp_path: Path) -
     with watched(tmp_path, "[safety]\nmax_force_n = 500.0\n") as terminal:
         terminal.until("safety.max_force_n")
         assert terminal.process.wait(PATIENCE_S) == 2
+
+
+def test_that_a_daemon_was_killed_is_said(tmp_path: Path) -> None:
+    with watched(tmp_path, "") as terminal:
+        terminal.until("ARMED")
+        of_it = Path(f"/proc/{terminal.process.pid}/task/{terminal.process.pid}/children").read_text().split()
+        os.kill(next(int(pid) for pid in of_it if b"run" in words(pid)), signal.SIGKILL)
+        terminal.until("the daemon was killed (SIGKILL)")
+        assert terminal.process.wait(PATIENCE_S) == 128 + signal.SIGKILL
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])

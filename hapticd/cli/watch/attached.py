@@ -27,7 +27,7 @@ def run_watched(config: Path, instance: str) -> int:
     The daemon's own lines would tear the view apart: they are kept, and printed when it is closed.
 
     Returns:
-        The daemon's exit code.
+        The daemon's exit code; 128 and the signal's number where it was killed, as in a shell.
     """
     hapticd = [sys.executable, "-P", "-m", "hapticd"]
     # When we end in any way, as when the terminal is closed, the daemon ramps its force out and the view ends.
@@ -58,6 +58,10 @@ def run_watched(config: Path, instance: str) -> int:
             code = _ended(daemon, _STOP_TIMEOUT_S)  # killed, its control process releases the device by itself
             log.seek(0)
             typer.echo(log.read(), err=True, nl=False)
+    if code < 0:
+        name = signal.Signals(-code).name
+        typer.echo(f"the daemon was killed ({name}): its control process or a helper takes the force away", err=True)
+        return 128 - code
     return code
 
 
