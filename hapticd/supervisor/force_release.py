@@ -5,8 +5,8 @@ everything imported, since the device holds its last force until it is released,
 be most of that time. A byte on its standard output says that it is ready; it then reads its standard input to the end:
 lines that name the device, and a mark which means release. Without the mark the supervisor has died, for who does not
 need it any more kills it. The loop lets go at that death by itself; where it is stopped or hangs, it is killed and the
-device released, and so it is where the loop has died before it let go. Where the loop is a real-time process so is
-this, so that a computer with more work than processors does not make it late.
+device released, and so it is where the loop has died before it let go; the daemon's log says what came of it. Where
+the loop is a real-time process so is this, so that a computer with more work than processors does not make it late.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import logging
 import os
 import select
 import signal
@@ -21,7 +22,8 @@ import subprocess
 import sys
 import threading
 import time
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.driver import Driver
@@ -30,6 +32,7 @@ from hapticd.loop.force_mark import ForceMark
 from hapticd.loop.realtime import become_realtime
 from hapticd.loop.resume import identity
 from hapticd.supervisor.orphans import kill_orphans
+from hapticd.supervisor.systemd import log_handler
 
 READY_TIMEOUT_S = 10.0
 """How long the helper may take to import what it needs [s]."""
@@ -46,6 +49,8 @@ _NO_ANSWER = f"the device did not answer within {TIMEOUT_S:g} s; its own watchdo
 _NOT_OPENED = "the device could not be opened: "
 _NOT_LET_GO = "the device did not let go: "
 _RELEASED = "the device is without force"
+
+_ALONE = {"levelno": logging.ERROR, "levelname": "ERROR", "msg": "the daemon was killed under force: %s"}
 
 _RELEASE = b"!"
 """What the helper reads last where it is to release the device."""
@@ -181,22 +186,30 @@ class ForceRelease:
 
 
 def _start(config: LoadedConfig, mark: ForceMark) -> subprocess.Popen[bytes]:
-    with os.fdopen(os.memfd_create("configuration"), "w+b") as file:
+    with os.fdopen(os.memfd_create("configuration"), "w+b") as file, _daemons_log() as log:
         file.write(config.text.encode())
         file.seek(0)
         return subprocess.Popen(
             [
                 *(sys.executable, "-P", "-m", "hapticd.supervisor.force_release"),
                 *("--config", str(file.fileno()), "--parent", str(os.getpid())),
-                *("--mark", str(mark.descriptor)),
+                *("--mark", str(mark.descriptor), "--log", str(log.fileno())),
             ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            pass_fds=[file.fileno(), mark.descriptor],
+            pass_fds=[file.fileno(), mark.descriptor, log.fileno()],
             bufsize=0,
             start_new_session=True,
         )
+
+
+def _daemons_log() -> IO[bytes]:
+    """Where the daemon's lines go, or nowhere if it has no standard error."""
+    try:
+        return os.fdopen(os.dup(2), "wb")
+    except OSError:
+        return Path(os.devnull).open("wb")
 
 
 def _let_go(driver: Driver[Any], device: str) -> str:
@@ -221,7 +234,9 @@ def main() -> int:
     parser.add_argument("--config", type=int, required=True)
     parser.add_argument("--parent", type=int, required=True)
     parser.add_argument("--mark", type=int, required=True)
+    parser.add_argument("--log", type=int, required=True)
     arguments = parser.parse_args()
+    alone = False
     try:
         with os.fdopen(arguments.config, "rb") as file:
             config = parse(file.read().decode(), "configuration")
@@ -235,12 +250,17 @@ def main() -> int:
         if mark != _RELEASE:
             if not (kill_orphans(arguments.parent) or ForceMark(arguments.mark).is_set):
                 return 0
+            alone = True
             signal.setitimer(signal.ITIMER_REAL, TIMEOUT_S)  # ends this; no one is left who would, if the driver hangs
         problem = _let_go(driver, json.loads(named[-1]) if named else "")
     except Exception as error:  # noqa: BLE001 - a driver is anybody's code; its exception becomes one line
         problem = f"{_NOT_OPENED}{error}"
-    with contextlib.suppress(OSError):
-        sys.stderr.write(problem)
+    if alone:
+        os.dup2(arguments.log, sys.stderr.fileno())
+        log_handler().handle(logging.makeLogRecord({**_ALONE, "args": (problem or _RELEASED,)}))
+    else:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(problem)
     return 1 if problem else 0
 
 

@@ -17,6 +17,7 @@ from hapticd.tick.event import EventCode
 from tests.daemon.running import Daemon, gone, wait_until
 from tests.faults.rig import Rig, anew_where_late, events_until
 
+SAID = "ERROR   the daemon was killed under force: the device is without force"
 HELPER = b"hapticd.supervisor.force_release"
 
 
@@ -52,6 +53,7 @@ def test_the_force_of_a_loop_that_does_not_notice_is_taken_away(stopped: bool) -
         wait_until(lambda: gone(helper), "the end of the helper")
         assert gone(control)
         assert rig.felt().force_n == 0.0
+        assert SAID in rig.daemon.output()
 
 
 def test_a_device_that_the_loop_has_let_go_of_is_left_alone() -> None:
@@ -66,6 +68,7 @@ def test_a_device_that_the_loop_has_let_go_of_is_left_alone() -> None:
         assert rig.released().force_n == 0.0
         wait_until(lambda: gone(helper), "the end of the helper")
         assert rig.felt().opened == 0
+        assert "killed under force" not in rig.daemon.output()
 
 
 @anew_where_late
@@ -86,6 +89,7 @@ def test_a_loop_that_is_killed_with_its_supervisor_leaves_no_force(loop_first: b
         assert rig.released().opened == 1
         assert rig.felt().force_n == 0.0
         wait_until(lambda: gone(helper), "the end of the helper")
+        assert SAID in rig.daemon.output()
 
 
 @anew_where_late
