@@ -227,7 +227,12 @@ def test_the_form_edits_the_file_and_the_wall_is_in_force(page: Page, daemon: Da
     apply(page, "scene.walls[0].stiffness_n_per_m", "2500")
     page.wait_inside("page.store.status.wall_stiffness_n_per_m[0] === 2500")
     assert daemon.config.read_text() == CONFIG.replace("3000.0      # soft", "2500.0      # soft")
-    page.wait_for("document.getElementById('form-note').textContent === 'In force.'")
+    said = "document.getElementById('form-note').textContent === 'In force.'"
+    page.wait_for(said)
+    # The daemon says which file is in force once more, after the answer; the form has read it.
+    page.inside("(page.settings.hash = 'of before', page.settings.follow(page.store.status.config_hash, true))")
+    page.inside("page.settings.connection.ask({ do: 'form' })")
+    assert page.evaluate(said)
     apply(page, "scene.walls[0].stiffness_n_per_m", "3000")
     page.wait_inside("page.store.status.wall_stiffness_n_per_m[0] === 3000")
     assert daemon.config.read_text() == CONFIG
@@ -337,7 +342,11 @@ def test_a_fault_is_held_said_and_cleared(page: Page, daemon: Daemon) -> None:
     assert page.evaluate(
         "/^..:..:.. .0530$/.test(document.querySelector('#events .fault').previousSibling.textContent)"
     )
-    page.wait_for("document.getElementById('form-note').textContent === 'In force.'")
+    said = "document.getElementById('form-note').textContent === 'In force.'"
+    page.wait_for(said)
+    at = page.inside("page.store.status.timestamp")
+    page.wait_inside(f"page.store.status.timestamp > {at}")
+    assert page.evaluate(said), "what the daemon says of its file comes later, and is no news"
     apply(page, "safety.max_speed_m_per_s", "")
     page.wait_for("document.getElementById('form-note').textContent === 'In force.'")
     assert daemon.config.read_text().count("max_speed") == 0

@@ -72,7 +72,7 @@ const connection = new Connection({
     say();
   },
 });
-const settings = new Settings(connection);
+export const settings = new Settings(connection);
 
 function addNotes(notes) {
   store.addNotes(notes);

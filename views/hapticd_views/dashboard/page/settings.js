@@ -11,6 +11,7 @@ export class Settings {
     this.form = null;
     this.fields = [];
     this.hash = "";
+    this.isApplying = false;
     this.tabs = new Map(TABS.map(([name, label]) => [name, this.#tab(name, label)]));
     this.show("law");
     this.get("form").addEventListener("submit", (event) => { event.preventDefault(); this.apply(); });
@@ -30,9 +31,11 @@ export class Settings {
 
   /** Ask for the form when the file in force is another one; what is being typed is not thrown away. */
   follow(hash, mayCommand) {
-    if (hash === this.hash && mayCommand === this.mayCommand) return;
+    if (this.isApplying || (hash === this.hash && mayCommand === this.mayCommand)) return;
+    const isShown = hash === this.form?.hash && mayCommand === this.mayCommand;
     this.hash = hash;
     this.mayCommand = mayCommand;
+    if (isShown) return;
     if (this.isChanged) this.#note("The file in force has changed. Revert to see it.", true);
     else this.load();
   }
@@ -55,12 +58,12 @@ export class Settings {
   async apply() {
     const changed = this.fields.filter((field) => field.isChanged);
     const values = Object.fromEntries(changed.map((field) => [field.spec.key, field.value]));
-    this.get("apply").disabled = true;
+    this.isApplying = this.get("apply").disabled = true;
     this.#note("Checking …");
     const answer = await this.connection.ask({ do: "edit", hash: this.form.hash, law: this.law.value, values });
-    this.get("apply").disabled = false;
+    if (answer.ok) await this.load();
+    this.isApplying = this.get("apply").disabled = false;
     if (answer.ok) {
-      await this.load();
       this.#note("In force.");
       return;
     }
