@@ -115,9 +115,9 @@ def pressed(daemon: Daemon, bench: Bench, still: bool = True) -> Rest:
 
 def lost_and_found(daemon: Daemon, bench: Bench, plug: Callable[[], Any]) -> str:
     """Pull the adapter while the wall pushes, put it in again; what the daemon said."""
+    push(daemon, bench)  # first: a busy computer may have lost the device before it pushes
     with Subscriber(daemon.endpoint, "hapticd/event", "hapticd/status") as subscriber:
         subscriber.until("hapticd/status")  # it is connected
-        push(daemon, bench)
         bench.unplug()
         lost = subscriber.until("hapticd/event", code=EventCode.DEVICE_LOST)
         plug()
