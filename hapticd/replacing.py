@@ -81,7 +81,9 @@ def write(path: Path, content: bytes) -> None:
     path = path.resolve()
     part = path.with_name(f".{path.name}.part")
     try:
-        part.write_bytes(content)
+        part.unlink(missing_ok=True)  # of one that was interrupted; through a link, another file would be written
+        with part.open("xb") as file:
+            file.write(content)
         put(part, path)
     except OSError as error:
         with contextlib.suppress(OSError):

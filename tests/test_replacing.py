@@ -8,7 +8,9 @@ import socket
 import stat
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +19,7 @@ from hapticd.errors import ConfigError, HapticdError, InstanceError
 from hapticd.keys.file import KeyWriteError, new_pair, write
 from hapticd.offline.traces import open_trace
 from hapticd.replacing import obstacle, put
+from hapticd.replacing import write as write_whole
 from hapticd.service.install import Installation, InstallationError
 from hapticd.supervisor.commands import CommandSocket
 from hapticd_studies.grid import output
@@ -100,6 +103,21 @@ def test_whatever_writes_refuses_it_and_leaves_nothing_beside_it(tmp_path: Path,
         write(there, new_pair(), replace=True)
     assert there.lstat() == before
     assert [path.name for path in tmp_path.iterdir()] == [there.name]
+
+
+@pytest.mark.parametrize("lay", [Path.symlink_to, Path.hardlink_to, lambda part, _other: os.mkfifo(part)])
+def test_nothing_is_written_through_what_lies_where_a_file_is_made(tmp_path: Path, lay: Any) -> None:
+    """Another file was overwritten, or a daemon that kept what it was armed with stood still for who reads a pipe."""
+    other = tmp_path / "other"
+    other.write_bytes(b"kept")
+    lay(tmp_path / ".armed.part", other)
+    writing = threading.Thread(target=write_whole, args=(tmp_path / "armed", b"new"), daemon=True)
+    writing.start()
+    writing.join(10.0)
+    assert not writing.is_alive()
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["armed", "other"]
+    assert ((tmp_path / "armed").read_bytes(), other.read_bytes()) == (b"new", b"kept")
+    assert not (tmp_path / "armed").is_symlink()
 
 
 def test_a_link_to_a_device_leads_no_file_over_it(tmp_path: Path) -> None:
