@@ -55,7 +55,8 @@ HISTORY_S = 8.0
     LAW_CODE,  # what the loop has loaded from files, which it leaves to the next one as well
     PORT_LAW_CODE,
     FIELDS,
-) = range(19)
+    PORTS_SINCE,  # deadline of the last tick that was recorded with another list of them [ns of CLOCK_MONOTONIC]
+) = range(20)
 """Words, each written by one side only."""
 
 DISARMED_SINCE = "not done: disarming was asked for after it"

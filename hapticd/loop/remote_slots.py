@@ -18,7 +18,7 @@ from collections.abc import Iterable, Sequence
 
 import msgpack
 
-from hapticd.loop.memory import MOST_PORTS, PORTS, REMOTE, SharedMemory
+from hapticd.loop.memory import MOST_PORTS, PORTS, PORTS_SINCE, REMOTE, SharedMemory
 from hapticd.tick.remote.port import Port
 from hapticd.tick.remote.update import SLOT_BYTES, Update, pack, unpack
 
@@ -64,7 +64,7 @@ class SlotReader:
 
         Args:
             ports: in the order of the scene.
-            now_ns: CLOCK_MONOTONIC [ns].
+            now_ns: deadline of the tick under way, which is recorded by now [ns of CLOCK_MONOTONIC].
         """
         number = list_of((port.name, port.kind) for port in ports)
         if number != self._list:
@@ -74,6 +74,7 @@ class SlotReader:
             self._list_before = self._list
             for index in range(MOST_PORTS):  # clients that have gone may have said it
                 self._counters[index] = self._words[index * _WORDS]
+            self._shared.words[PORTS_SINCE] = now_ns
         self._ports = ports
         self._list = number
         self._shared.words[PORTS] = number
@@ -141,10 +142,10 @@ class SlotWriter:
                 self._words[at] += 1
                 shared.words[REMOTE] += 1
 
-    @property
-    def in_force(self) -> bool:
-        """Whether the loop has the same list of ports."""
-        return self._shared.words[PORTS] == self.ports_list
+    def recorded(self, deadline_ns: int) -> bool:
+        """Whether the loop has the same list of ports, and had it in a tick that was due then [ns]."""
+        words = self._shared.words
+        return words[PORTS] == self.ports_list and words[PORTS_SINCE] < deadline_ns
 
     def written(self, index: int) -> Update | None:
         """What was said of a port last, whoever wrote it; None: nothing, or with another list of ports.

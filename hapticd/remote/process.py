@@ -135,14 +135,15 @@ class RemoteServer:
         records = self._memory.reader.read()
         if not records:
             return
-        # A list that is another one by now may have been it already in these ticks.
-        known = self._scene.ports if self._memory.slots.in_force else {}
+        for record in records:
+            if not self._memory.slots.recorded(record.deadline_ns):
+                record.ports = None  # of another list
+        ports = list(self._scene.ports.values())
         if self._state.subscribed:
-            names = [(name, port.since_ns) for name, port in known.items()]
+            names = [(name, port.since_ns) for name, port in self._scene.ports.items()]
             for record in records[-_MOST_BEHIND:]:
                 self._state.send(state_map(record, names, self._settings.epoch_offset_ns))
-        ports = list(known.values())
-        for record in records if ports else ():
+        for record in records:
             done_ns = record.deadline_ns + int((record.late_us + record.busy_us) * 1e3)
             for recorded in ports_of(record):
                 ports[recorded.index].now_in_force(recorded.seq, record.seq, done_ns, self._period_ns)

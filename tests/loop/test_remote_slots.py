@@ -192,14 +192,17 @@ def test_an_update_for_another_list_of_ports_is_taken_for_no_other_name(
     shared: SharedMemory, reader: SlotReader, ports: list[HeardPort]
 ) -> None:
     before = SlotWriter(shared, PORTS)
-    assert before.in_force
-    reader.serve([ports[1], ports[0]], 0)
+    assert before.recorded(1)
+    assert not before.recorded(0), "this tick was recorded before there was a list"
+    reader.serve([ports[1], ports[0]], 5)
     before.write(0, at(0.1))  # meant for the tool, which goes on
     reader.take(0)
     assert [len(port.heard) for port in ports] == [1, 0]
-    assert not before.in_force
+    assert not before.recorded(6)
     after = SlotWriter(shared, reversed(PORTS))
-    assert after.in_force
+    assert (after.recorded(5), after.recorded(6)) == (False, True)
+    reader.serve([ports[1], ports[0]], 7)
+    assert after.recorded(6), "the list goes on"
     after.write(0, at(0.2))
     reader.take(0)
     assert len(ports[1].heard) == 1
