@@ -101,6 +101,7 @@ class Daemon:
             self.release.name(identity(loop.info))  # no other takes its place for as long as the daemon runs
             starting = undo.enter_context(contextlib.ExitStack())
             starting.callback(self._end, loop)
+            hold.follow(loop, 0, config, False)  # it may arm itself now, and this may die before its first turn
             publisher = Publisher(config.config.telemetry, self.lock.directory / TELEMETRY, loop.info, offset_ns, ring)
             undo.callback(publisher.close)
             commands = CommandSocket(self.lock.directory / CONTROL, config.config.control.tcp, ring)

@@ -18,7 +18,9 @@ from hapticd.loop.resume import FROM_START, ResumeState
 from hapticd.supervisor.arm_hold import EDITED, ArmHold
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
+from tests.daemon.running import wait_until
 from tests.faults.rig import Rig, anew_where_late, events_until
+from tests.remote.stage import remote_pid
 
 HELD = "stays disarmed: it was disarmed, or a fault had stopped it, when the daemon before ended"
 
@@ -122,6 +124,24 @@ def test_what_was_edited_since_a_daemon_died_arms_itself_only_once_somebody_asks
         armed(rig)
         rig.daemon.again()
         rig.pressing()
+
+
+@anew_where_late
+def test_what_was_edited_after_a_daemon_died_on_its_way_waits_as_well() -> None:
+    """Its loop had pushed before there was a first turn, which alone kept what with: a wall of 50 kN/m came instead."""
+    rig = Rig(safety="auto_arm = true", more='[[scene.forces]]\nname = "field"\nmax_force_n = 1.0\n')
+    daemon = rig.daemon
+    try:
+        wait_until(lambda: remote_pid(daemon), "the process that hears clients")
+        os.kill(hearing := remote_pid(daemon), signal.SIGSTOP)  # a busy computer may take its time as well
+        wait_until(lambda: rig.felt().force_n > 1.0, "a force before the daemon is ready")
+        armed(rig)
+        os.kill(hearing, signal.SIGKILL)
+        edit(rig)
+        daemon.again()
+        waits(rig)
+    finally:
+        rig.__exit__()
 
 
 @anew_where_late
