@@ -144,8 +144,7 @@ class SlotWriter:
 
     def recorded(self, deadline_ns: int) -> bool:
         """Whether the loop has the same list of ports, and had it in a tick that was due then [ns]."""
-        words = self._shared.words
-        return words[PORTS] == self.ports_list and words[PORTS_SINCE] < deadline_ns
+        return self._shared.words[PORTS] == self.ports_list and self._shared.words[PORTS_SINCE] < deadline_ns
 
     def written(self, index: int) -> Update | None:
         """What was said of a port last, whoever wrote it; None: nothing, or with another list of ports.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
+import threading
 from pathlib import Path
 
 from hapticd.config.file import read
@@ -18,6 +20,7 @@ from hapticd.tick.flags import Flag
 
 HELD = "stays disarmed: it was disarmed, or a fault had stopped it, when the daemon before ended; `hapticd arm`"
 EDITED = "stays disarmed: edited or tared, as far as can be told, before the last daemon died; `hapticd arm`"
+UNKEPT = "stays disarmed: nothing can be kept in the state directory, so nor was an earlier disarming; `hapticd arm`"
 
 log = logging.getLogger("hapticd")
 
@@ -43,8 +46,8 @@ class ArmHold:
         self._armed: tuple[LoadedConfig, list[int], bool] | None = None  # what the device may be armed with
         self._armed_kept = True  # the other file says the same
         self._path = path
-        self._kept = True  # the file says the same as `held`
         self.held = _is_there(path)
+        self._kept = not self.held  # the file says the same as `held`; whether it does that may not be known
         self.inherited = HELD if self.held else ""
 
     def resume(self, config: LoadedConfig) -> ResumeState:
@@ -62,6 +65,11 @@ class ArmHold:
                 law_code, port_law_code, fields = map(int, codes)
             except (HapticdError, OSError, ValueError):  # edited, or not readable
                 self.inherited = self.inherited or EDITED
+        if config.config.safety.auto_arm:
+            with contextlib.suppress(OSError):
+                make_directory(self._path.parent, 0o750)
+            if not os.access(self._path.parent, os.W_OK | os.X_OK):
+                self.inherited = self.inherited or UNKEPT
         return ResumeState(may_arm=not self.inherited, law_code=law_code, port_law_code=port_law_code, fields=fields)
 
     def follow(self, loop: LoopProcess, flags: int, config: LoadedConfig, tared: bool) -> None:
@@ -78,7 +86,7 @@ class ArmHold:
         if flags & Flag.ARMED:
             self.inherited = ""
             self._keep(loop, held=False)
-        elif flags & Flag.LATCHED or loop.shared.words[DISARM]:
+        elif flags & Flag.LATCHED or loop.shared.words[DISARM] or self.held:
             self._keep(loop, held=True)
 
     def follow_lost(self, loop: LoopProcess, resume: ResumeState) -> None:
@@ -111,6 +119,8 @@ class ArmHold:
             write(self._armed_path, " ".join(["tared" if tared else config.sha256, *map(str, armed[1])]).encode())
         except (OSError, HapticdError) as error:
             self._armed_kept = False
+            with contextlib.suppress(OSError):
+                self._armed_path.touch(mode=0o640)  # also on a disk that is full; an empty one holds
             if not told:
                 log.warning("%s; a daemon started anew after a crash does not know what was edited since", error)
 
@@ -118,19 +128,29 @@ class ArmHold:
         if (held == self.held and self._kept) or loop.info.simulated:
             return
         told = held == self.held
-        self.held, self._kept = held, True
-        self.inherited = ""
+        self.held, self._kept, self.inherited = held, True, self.inherited if told else ""
         try:
             if held:
                 make_directory(self._path.parent, 0o750)
                 self._path.touch(mode=0o640)
+                threading.Thread(target=_sync, args=(self._path.parent,), daemon=True).start()
             else:
                 self._path.unlink(missing_ok=True)
-        except OSError as error:
+        except (OSError, RuntimeError) as error:  # the other where there is room for no thread
             self._kept = False  # a disk that is full now may not be so at the next look
             if not told:
                 what = "stays disarmed" if held else "may be armed by itself again"
                 log.warning("%s: %s; one started anew does not know that the device %s", self._path, error, what)
+
+
+def _sync(directory: Path) -> None:
+    """Have a new file there outlive a power cut; a slow disk takes seconds, so in no turn of the daemon."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _is_there(path: Path) -> bool:

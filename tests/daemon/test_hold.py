@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import queue
 import signal
 import tracemalloc
 from dataclasses import replace
@@ -13,9 +14,11 @@ from typing import Any
 import pytest
 
 from hapticd.config.loading import LoadedConfig, parse
+from hapticd.errors import HapticdError
 from hapticd.loop.memory import DISARM, FIELDS, LAW_CODE, MAY_ARM, PORT_LAW_CODE
 from hapticd.loop.resume import FROM_START, ResumeState
-from hapticd.supervisor.arm_hold import EDITED, ArmHold
+from hapticd.supervisor import arm_hold
+from hapticd.supervisor.arm_hold import EDITED, UNKEPT, ArmHold
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
 from tests.daemon.running import wait_until
@@ -204,6 +207,10 @@ def sparse(path: Path) -> None:
         file.truncate(1 << 27)
 
 
+def refused(_path: Path) -> None:
+    raise PermissionError(13, "Permission denied")
+
+
 def running(text: str = "") -> LoadedConfig:
     return parse(text, "running")
 
@@ -301,6 +308,47 @@ class TestTheFile:
         hold.follow(loop(), Flag.ARMED, running(), False)
         assert not ArmHold(path).resume(running("# edited")).may_arm
 
+    def test_a_disk_that_has_room_for_names_only_holds(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """What was edited since could not be told, and the next daemon pushed with it."""
+
+        def full(path: Path, _content: bytes) -> None:
+            raise HapticdError(f"{path}: cannot be written: No space left on device")
+
+        monkeypatch.setattr(arm_hold, "write", full)
+        ArmHold(path).follow(loop(), Flag.ARMED, running(), False)
+        assert not ArmHold(path).resume(running()).may_arm
+
+    def test_where_nothing_can_be_kept_what_arms_by_itself_waits(self, path: Path) -> None:
+        """A disk had become read-only, so a disarming was not kept, and the next daemon pushed with 2.5 N."""
+        path.parent.touch()
+        auto_arm = running("[safety]\nauto_arm = true")
+        assert ArmHold(path).resume(running()).may_arm, "a simulated device may"
+        hold = ArmHold(path)
+        assert not hold.resume(auto_arm).may_arm
+        assert hold.inherited == UNKEPT
+        path.parent.unlink()
+        assert ArmHold(path).resume(auto_arm).may_arm
+
+    def test_what_could_not_be_looked_for_is_kept_once_it_can(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The directory was another user's for a while; the next daemon armed what had been disarmed before."""
+        with monkeypatch.context() as closed:
+            closed.setattr(Path, "lstat", refused)
+            hold = ArmHold(path)
+        hold.follow(loop(), 0, running(), False)
+        assert hold.inherited == arm_hold.HELD
+        assert ArmHold(path).held
+
+    def test_a_disarming_outlives_a_power_cut(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Within seconds after it the disk knew nothing of it: the device armed itself when the power was back."""
+        synced: queue.Queue[str] = queue.Queue()
+        monkeypatch.setattr(
+            os, "fsync", lambda descriptor: synced.put(str(Path(f"/proc/self/fd/{descriptor}").readlink()))
+        )
+        ArmHold(path).follow(loop(1), 0, running(), False)
+        assert synced.get(timeout=20.0) == str(path.parent)
+
     def test_a_directory_that_takes_nothing_is_told_of_once(self, path: Path, caplog: pytest.LogCaptureFixture) -> None:
         path.parent.touch()
         hold = ArmHold(path)
@@ -317,8 +365,5 @@ class TestTheFile:
         assert not ArmHold(path).held
 
     def test_a_file_that_nobody_can_look_for_holds(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        def refused(_path: Path) -> None:
-            raise PermissionError(13, "Permission denied")
-
         monkeypatch.setattr(Path, "lstat", refused)
         assert ArmHold(path).held
