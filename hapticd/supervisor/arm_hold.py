@@ -69,7 +69,7 @@ class ArmHold:
             with contextlib.suppress(OSError):
                 make_directory(self._path.parent, 0o750)
             if not os.access(self._path.parent, os.W_OK | os.X_OK):
-                self.inherited = self.inherited or UNKEPT
+                self.held, self._kept, self.inherited = True, False, self.inherited or UNKEPT
         return ResumeState(may_arm=not self.inherited, law_code=law_code, port_law_code=port_law_code, fields=fields)
 
     def follow(self, loop: LoopProcess, flags: int, config: LoadedConfig, tared: bool) -> None:

@@ -328,6 +328,8 @@ class TestTheFile:
         assert hold.inherited == UNKEPT
         path.parent.unlink()
         assert ArmHold(path).resume(auto_arm).may_arm
+        hold.follow(loop(), 0, auto_arm, False)
+        assert not ArmHold(path).resume(auto_arm).may_arm, "what waits is kept once it can be"
 
     def test_what_could_not_be_looked_for_is_kept_once_it_can(
         self, path: Path, monkeypatch: pytest.MonkeyPatch
