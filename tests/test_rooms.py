@@ -26,7 +26,7 @@ PACKAGES = {
 SOURCES = {name: sorted(folder.rglob("*.py")) for name, folder in PACKAGES.items()}
 
 LONGEST_CHAIN = 13  # down to what is known of shapes: the proxy, its way out, their surface, distance, field
-MOST_LINES = 38_250  # raised on purpose only: what a daemon that died was armed with, and a loop that died with it
+MOST_LINES = 38_300  # raised on purpose only: what a daemon that died was armed with, and a loop that died with it
 MOST_LINES_OF_A_MODULE = 400
 LARGEST_ROOM = 0.195  # tick: couplings, forces and remote objects are contacts, and need what contacts are made of
 

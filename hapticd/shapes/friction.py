@@ -11,7 +11,8 @@ from typing import Any
 from hapticd.shapes.surface import SURFACE_M, land
 
 _LEAST_M2 = 1e-16  # two places that are less than 10 nm apart are one
-_LANDINGS = 3
+_LANDINGS = 6
+_NEARER = 0.9
 _CONE = 1.02
 
 
@@ -30,28 +31,34 @@ def rub(proxy: Any, others: Any, voxels: Any, px: float, py: float, pz: float) -
         proxy.sliding = True
         free_m = proxy.dynamic_friction * proxy.depth_m
         share = free_m / sqrt(ee)
-        for _ in range(_LANDINGS):  # round a corner the way along the surface is longer than the straight one
-            d, x, y, z, _, _, _ = land(
-                proxy, others, voxels, proxy.gx + share * ex, proxy.gy + share * ey, proxy.gz + share * ez
-            )
-            wx = x - proxy.gx
-            wy = y - proxy.gy
-            wz = z - proxy.gz
-            vv = wx * wx + wy * wy + wz * wz
-            if vv <= _CONE * free_m * free_m + _LEAST_M2:
-                break
-            share *= 0.9 * free_m / sqrt(vv)
-        else:
-            d = 1.0  # no place found: it goes to the goal
         wx = proxy.sx - px
         wy = proxy.sy - py
         wz = proxy.sz - pz
         ww = wx * wx + wy * wy + wz * wz
-        wx = x - px
-        wy = y - py
-        wz = z - pz
-        vv = wx * wx + wy * wy + wz * wz
-        if not (vv <= ww and -SURFACE_M <= d <= SURFACE_M):
+        x = proxy.gx + share * ex
+        y = proxy.gy + share * ey
+        z = proxy.gz + share * ez
+        for _ in range(_LANDINGS):
+            d, x, y, z, _, _, _ = land(proxy, others, voxels, x, y, z)
+            if d < -SURFACE_M or d > SURFACE_M:  # to and fro between the faces of a crease: from there again
+                continue
+            wx = x - proxy.gx
+            wy = y - proxy.gy
+            wz = z - proxy.gz
+            ee = wx * wx + wy * wy + wz * wz
+            wx = x - px
+            wy = y - py
+            wz = z - pz
+            vv = wx * wx + wy * wy + wz * wz
+            if ee <= _CONE * free_m * free_m + _LEAST_M2 and vv <= ww:
+                break
+            share *= _NEARER
+            if ee > free_m * free_m:  # round a corner the way along the surface is longer than the straight one
+                share *= free_m / sqrt(ee)
+            x = proxy.gx + share * ex
+            y = proxy.gy + share * ey
+            z = proxy.gz + share * ez
+        else:  # no place found: it goes to the goal
             x = proxy.gx
             y = proxy.gy
             z = proxy.gz

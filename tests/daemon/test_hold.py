@@ -138,6 +138,8 @@ def test_what_was_edited_after_a_daemon_died_on_its_way_waits_as_well() -> None:
         wait_until(lambda: remote_pid(daemon), "the process that hears clients")
         os.kill(hearing := remote_pid(daemon), signal.SIGSTOP)  # a busy computer may take its time as well
         wait_until(lambda: rig.felt().force_n > 1.0, "a force before the daemon is ready")
+        kept = daemon.directory / "state" / "default" / "armed"
+        wait_until(kept.exists, "the daemon to have heard of its loop, which a busy computer may keep it from")
         armed(rig)
         os.kill(hearing, signal.SIGKILL)
         edit(rig)

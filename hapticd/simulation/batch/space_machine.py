@@ -100,7 +100,7 @@ class SpaceMachine:
                     without=("normal",),
                 ),
                 Channel: Form(
-                    ("rest", "see", "apply", "act", "lessen", "snapshot"),
+                    ("rest", "see", "apply", "act", "ask", "snapshot"),
                     instead={f"law.{name}": value for name, value in published.items()},
                     without=("ledger",),
                 ),

@@ -127,10 +127,10 @@ class Channel(Contact):
         tick.spring_n = self.wall.spring_n = spring_n
         tick.contact_n = self._contact_n = contact_n
 
-    def lessen(self, part: float) -> None:
-        """Have its law ask for this part of what it has, 0 to 1; a blend goes over to that."""
-        self.requested_n = kept_n = part * self.requested_n
-        self.force_n = blended(self, self.x_m, kept_n, 0.0) if self.blending else kept_n
+    def ask(self, newton: float) -> None:
+        """Have its law ask for this and not for what it has [N]; a blend goes over to that."""
+        self.requested_n = newton
+        self.force_n = blended(self, self.x_m, newton, 0.0) if self.blending else newton
 
     def apply(self, share: float, spring_n: float) -> None:
         """Remember what is applied from now on.
@@ -213,6 +213,41 @@ def slip_along(
         else:
             channel.see(0.0, 0.0, moved_m, v_m_per_s, dt_s, 0.0, 0.0)
         held -= 1
+
+
+def hold_stroke(channels: Sequence[Channel], proxy: Any, stiffness_n_per_m: float) -> None:
+    """Let no law hold a stroke over a rough solid with creases by more than static friction and its spring do.
+
+    That is across the way to the proxy, however the channels lie: pinned in a crease they stay as they are, and the
+    bound must not step where that ends. What a held spring leaks there, k dt / 2 times the speed, a law may take twice.
+
+    Args:
+        channels: of the solid, the normal first.
+        proxy: of it.
+        stiffness_n_per_m: of the spring [N/m].
+    """
+    nx, ny, nz = proxy.normal_x, proxy.normal_y, proxy.normal_z
+    fx = fy = fz = vx = vy = vz = 0.0
+    for channel in channels:
+        newton, speed_m_per_s = channel.requested_n, channel.velocity_m_per_s
+        fx += newton * channel.dx
+        fy += newton * channel.dy
+        fz += newton * channel.dz
+        vx += speed_m_per_s * channel.dx
+        vy += speed_m_per_s * channel.dy
+        vz += speed_m_per_s * channel.dz
+    off = fx * nx + fy * ny + fz * nz
+    fx -= off * nx
+    fy -= off * ny
+    fz -= off * nz
+    off = vx * nx + vy * ny + vz * nz
+    way_m = channels[0].tick.dt_s * sqrt(max(0.0, vx * vx + vy * vy + vz * vz - off * off))
+    most_n = stiffness_n_per_m * (proxy.static_friction * proxy.depth_m + way_m)
+    asked_n2 = fx * fx + fy * fy + fz * fz
+    if asked_n2 > most_n * most_n:
+        less = 1.0 - most_n / sqrt(asked_n2)
+        for channel in channels:
+            channel.ask(channel.requested_n - less * (fx * channel.dx + fy * channel.dy + fz * channel.dz))
 
 
 def settle_along(contact: Any, share: float, gain: float, limit_n: float, dt_s: float) -> None:

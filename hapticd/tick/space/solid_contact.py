@@ -18,6 +18,7 @@ from hapticd.tick.contact import RunningLaw
 from hapticd.tick.energy import EnergyLedger
 from hapticd.tick.space.channel import (
     Channel,
+    hold_stroke,
     lay_along,
     settle_along,
     share_along,
@@ -289,8 +290,10 @@ class SolidContact:
             asked_n2 = first.requested_n * first.requested_n + second.requested_n * second.requested_n
             if asked_n2 > most_n * most_n:  # no law holds a stroke by more than static friction does
                 part = most_n / sqrt(asked_n2)
-                first.lessen(part)
-                second.lessen(part)
+                first.ask(part * first.requested_n)
+                second.ask(part * second.requested_n)
+        elif solid.rough:
+            hold_stroke(self.channels, solid.proxy, solid.stiffness_n_per_m)
 
     def hold(self, periods: float) -> None:
         """Stay with what the laws asked for last, at a tick without a new sample; a blend goes on."""

@@ -75,6 +75,39 @@ def test_a_stroke_over_a_rough_surface_meets_its_cone_and_no_more_from_the_touch
 
 
 @pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
+@pytest.mark.parametrize("way_m", [1.5e-4, -1.5e-4])
+def test_nor_does_a_stroke_over_rough_objects_that_are_one(way_m: float, law: str) -> None:
+    """With an inner edge somewhere there was no bound: 9.6 N for 40 ms at 0.15 m/s, which then ended in one tick."""
+    other = table("other", "box", 2000.0, size_m=[0.1, 0.8, 0.2], position_m=[-0.45, 0.0, 0.0], static_friction=0.5)
+    scene = f"{ROUGH}dynamic_friction = 0.4\n{other}dynamic_friction = 0.4\n"
+    rig = Rig(scene, law, info=REAL).start((0.0, 0.0, 0.002)).to((0.0, 0.0, 0.001), 60)
+    for n in range(200):
+        z_m = max(0.001 - 3e-5 * n, -0.0015)
+        rig.go((way_m * n, 0.0, z_m))
+        assert abs(rig.force[0]) <= 2000.0 * (0.5 * max(-z_m, 0.0) + 1.1 * abs(way_m)), n
+    assert abs(rig.force[0]) > 0.5
+
+
+@pytest.mark.parametrize(("friction", "way_m"), [(0.3, 3e-5), (0.3, 2e-4), (0.6, 1e-4)])
+@pytest.mark.parametrize("angle", [250, 270, 290, 310, 340])
+def test_what_slips_along_a_bent_inner_edge_keeps_its_friction(angle: int, friction: float, way_m: float) -> None:
+    """No place was found beside the cone's edge, and the friction was gone in one tick: up to 6.7 N."""
+    keys = {"radius_m": 0.015, "length_m": 0.2, "static_friction": friction, "dynamic_friction": 0.8 * friction}
+    lying = table("a", "capsule", 2000.0, position_m=[-0.014, 0, 0], orientation=[1.0, 1.0, 0.0, 0.0], **keys)
+    askew = table("b", "capsule", 2000.0, position_m=[0.014, 0, 0], orientation=[1.0, 0.7, 0.5, 0.0], **keys)
+    rig = Rig(lying + askew, "none", info=REAL).start((0.0, 0.0, 0.0084)).to((0.0, 0.0, 0.0014), 200)
+    still, x, y = len(rig.forces), 0.0, 0.0
+    for n in range(150):
+        x += min(1.0, n / 20) * way_m * math.cos(math.radians(angle))
+        y += min(1.0, n / 20) * way_m * math.sin(math.radians(angle))
+        if abs(x) < 0.014:
+            rig.go((x, y, 0.0014))
+    felt = rig.forces[still - 1 :]
+    sticks_n = 0.2 * friction * 2000.0 * 0.008  # what static friction holds more than dynamic, at the depth that comes
+    assert max(map(math.dist, felt, felt[1:])) < sticks_n + 2.0 * 2000.0 * way_m + 0.1
+
+
+@pytest.mark.parametrize("law", plugins.names(plugins.CONTROLLERS))
 @pytest.mark.parametrize("way_m", [5e-5, 3e-4])
 def test_no_law_steps_where_a_stroke_to_and_fro_begins_to_slip(way_m: float, law: str) -> None:
     """A damper that saw the slip's own speed would let go of 50 N s/m times the hand's in one tick."""
