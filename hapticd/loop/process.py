@@ -152,6 +152,7 @@ def _prepare(asked: _Asked, channel: socket.socket, parent_pid: int) -> ControlL
         signal.signal(signal.SIGTERM, stop)
         die_with_parent(parent_pid)
         problems, advice = become_realtime(settings.loop)
+        control.requests.worker.start()  # before the supervisor counts how long no tick has come
         shared.words[SUPERVISOR_BEAT] = time.monotonic_ns()
         hello = {"info": asdict(info), "realtime": not problems, "warnings": problems + advice, "pid": os.getpid()}
         hello["accuracy"] = asked.accuracy

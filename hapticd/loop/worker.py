@@ -19,11 +19,19 @@ class Worker:
     def __init__(self) -> None:
         self._work: Callable[[], None] | None = None
         self._ending = False
+        self._started = False
         self._gate = threading.Lock()  # open while there is something to do
         self._gate.acquire()
 
     def start(self) -> None:
-        """Have the thread wait; called by the loop's thread, once that is scheduled as it will be."""
+        """Have the thread wait; called by the loop's thread, once that is scheduled as it will be.
+
+        It begins as an ordinary thread and is waited for, which takes its time on a busy computer. A second call does
+        nothing.
+        """
+        if self._started:
+            return
+        self._started = True
         thread = threading.Thread(target=self._run, name="beside-the-loop", daemon=True)
         thread.start()
         priority = os.sched_getparam(0).sched_priority - 1

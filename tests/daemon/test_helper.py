@@ -1,4 +1,7 @@
-"""The helper that takes the force away is ready before there can be a force, or its absence is told."""
+"""The helper that takes the force away is ready before there can be a force, or its absence is told.
+
+And what the loop's process waits for at its start does not count as a loop that stands still.
+"""
 
 from __future__ import annotations
 
@@ -55,3 +58,21 @@ def test_a_daemon_without_its_helper_runs_and_says_so(tmp_path: Path) -> None:
         assert daemon.output().count("no helper is ready") == 1
         warnings = subscriber.until("hapticd/status", armed=True)["warnings"]
         assert any("no helper is ready" in warning for warning in warnings)
+
+
+SLOW_THREADS = """
+import sys, threading, time
+if "hapticd.loop.process" in sys.orig_argv:
+    start = threading.Thread.start
+    def late(self):
+        time.sleep(0.5)
+        start(self)
+    threading.Thread.start = late
+"""
+
+
+def test_a_computer_that_is_slow_to_begin_a_thread_lets_the_loop_start(tmp_path: Path) -> None:
+    """The loop waited for its thread, an ordinary one at first, in the 0.1 s in which its first tick has to come."""
+    (tmp_path / "sitecustomize.py").write_text(SLOW_THREADS)
+    with Daemon("", pythonpath=tmp_path).wait_ready() as daemon:
+        assert "stood still" not in daemon.output()
