@@ -50,7 +50,7 @@ _NOT_OPENED = "the device could not be opened: "
 _NOT_LET_GO = "the device did not let go: "
 _RELEASED = "the device is without force"
 
-_ALONE = {"levelno": logging.ERROR, "levelname": "ERROR", "msg": "the daemon was killed under force: %s"}
+_ALONE = "the daemon was killed under force: %s"
 
 _RELEASE = b"!"
 """What the helper reads last where it is to release the device."""
@@ -257,7 +257,8 @@ def main() -> int:
         problem = f"{_NOT_OPENED}{error}"
     if alone:
         os.dup2(arguments.log, sys.stderr.fileno())
-        log_handler().handle(logging.makeLogRecord({**_ALONE, "args": (problem or _RELEASED,)}))
+        said = logging.LogRecord("hapticd", logging.ERROR, "", 0, _ALONE, (problem or _RELEASED,), None)
+        log_handler().handle(said)
     else:
         with contextlib.suppress(OSError):
             sys.stderr.write(problem)

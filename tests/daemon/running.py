@@ -185,6 +185,12 @@ def all_records(memory: SharedMemory) -> list[TickRecord]:
     return reader.read(memory.slots)
 
 
+def child_pid(pid: int, word: str) -> int:
+    """The child of a process that has this word on its command line."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return next(int(child) for child in children if word in Path(f"/proc/{child}/cmdline").read_text().split("\0"))
+
+
 def gone(pid: int) -> bool:
     """Whether a process has ended (a zombie has)."""
     try:

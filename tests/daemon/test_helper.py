@@ -1,6 +1,6 @@
-"""The helper that takes the force away is ready before there can be a force, or its absence is told.
+"""The helper that takes the force away is ready before there can be a force; the daemon says so where there is none.
 
-And what the loop's process waits for at its start does not count as a loop that stands still.
+What the loop's process waits for at its start does not count as a loop that stands still.
 """
 
 from __future__ import annotations

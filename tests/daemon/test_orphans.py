@@ -14,11 +14,10 @@ import pytest
 from hapticd.loop.memory import RECORDS, SharedMemory
 from hapticd.supervisor.orphans import kill_orphans
 from hapticd.tick.event import EventCode
-from tests.daemon.running import Daemon, gone, wait_until
+from tests.daemon.running import Daemon, child_pid, gone, wait_until
 from tests.faults.rig import Rig, anew_where_late, events_until
 
 SAID = "ERROR   the daemon was killed under force: the device is without force"
-HELPER = b"hapticd.supervisor.force_release"
 
 
 def stands_still(memory: SharedMemory) -> bool:
@@ -28,9 +27,7 @@ def stands_still(memory: SharedMemory) -> bool:
 
 
 def helper_pid(daemon: Daemon) -> int:
-    pid = daemon.process.pid
-    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return next(int(child) for child in children if HELPER in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0"))
+    return child_pid(daemon.process.pid, "hapticd.supervisor.force_release")
 
 
 @pytest.mark.parametrize("stopped", [True, False], ids=["stopped", "hanging"])

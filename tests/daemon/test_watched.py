@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.daemon.running import HAPTICD, PATIENCE_S, wait_until
+from tests.daemon.running import HAPTICD, PATIENCE_S, child_pid, wait_until
 from tests.daemon.terminal import Terminal
 
 CONFIG = Path(__file__).parents[2] / "config" / "hapticd.toml"
@@ -29,11 +29,6 @@ def watched(place: Path, text: str) -> Iterator[Terminal]:
         yield terminal
     finally:
         terminal.close()
-
-
-def words(pid: str) -> list[bytes]:
-    """The command line of a process."""
-    return Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
 
 
 def test_from_one_command_to_a_live_view_and_back(tmp_path: Path) -> None:
@@ -56,8 +51,7 @@ def test_a_daemon_that_cannot_start_says_why_and_ends_the_view(tmp_path: Path) -
 def test_that_a_daemon_was_killed_is_said(tmp_path: Path) -> None:
     with watched(tmp_path, "") as terminal:
         terminal.until("ARMED")
-        of_it = Path(f"/proc/{terminal.process.pid}/task/{terminal.process.pid}/children").read_text().split()
-        os.kill(next(int(pid) for pid in of_it if b"run" in words(pid)), signal.SIGKILL)
+        os.kill(child_pid(terminal.process.pid, "run"), signal.SIGKILL)
         terminal.until("the daemon was killed (SIGKILL)")
         assert terminal.process.wait(PATIENCE_S) == 128 + signal.SIGKILL
 

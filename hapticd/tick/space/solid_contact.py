@@ -287,6 +287,7 @@ class SolidContact:
         if self.sides > 1 and not solid.creases:
             _, first, second = self.channels
             most_n = solid.proxy.static_friction * solid.stiffness_n_per_m * self.depth_m
+            # What `hold_stroke` does, for less: here the channels always lie along the surface.
             asked_n2 = first.requested_n * first.requested_n + second.requested_n * second.requested_n
             if asked_n2 > most_n * most_n:  # no law holds a stroke by more than static friction does
                 part = most_n / sqrt(asked_n2)

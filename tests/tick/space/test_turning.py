@@ -96,14 +96,15 @@ def test_what_slips_along_a_bent_inner_edge_keeps_its_friction(angle: int, frict
     lying = table("a", "capsule", 2000.0, position_m=[-0.014, 0, 0], orientation=[1.0, 1.0, 0.0, 0.0], **keys)
     askew = table("b", "capsule", 2000.0, position_m=[0.014, 0, 0], orientation=[1.0, 0.7, 0.5, 0.0], **keys)
     rig = Rig(lying + askew, "none", info=REAL).start((0.0, 0.0, 0.0084)).to((0.0, 0.0, 0.0014), 200)
-    still, x, y = len(rig.forces), 0.0, 0.0
+    still, x, y, deepest_m = len(rig.forces), 0.0, 0.0, 0.0
     for n in range(150):
         x += min(1.0, n / 20) * way_m * math.cos(math.radians(angle))
         y += min(1.0, n / 20) * way_m * math.sin(math.radians(angle))
         if abs(x) < 0.014:
             rig.go((x, y, 0.0014))
+            deepest_m = max(deepest_m, rig.tick.solids[0].depth_m)
     felt = rig.forces[still - 1 :]
-    sticks_n = 0.2 * friction * 2000.0 * 0.008  # what static friction holds more than dynamic, at the depth that comes
+    sticks_n = 0.2 * friction * 2000.0 * deepest_m  # what static friction holds more than dynamic
     assert max(map(math.dist, felt, felt[1:])) < sticks_n + 2.0 * 2000.0 * way_m + 0.1
 
 

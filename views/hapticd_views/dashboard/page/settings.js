@@ -11,7 +11,6 @@ export class Settings {
     this.form = null;
     this.fields = [];
     this.hash = "";
-    this.isApplying = false;
     this.tabs = new Map(TABS.map(([name, label]) => [name, this.#tab(name, label)]));
     this.show("law");
     this.get("form").addEventListener("submit", (event) => { event.preventDefault(); this.apply(); });
@@ -31,7 +30,7 @@ export class Settings {
 
   /** Ask for the form when the file in force is another one; what is being typed is not thrown away. */
   follow(hash, mayCommand) {
-    if (this.isApplying || (hash === this.hash && mayCommand === this.mayCommand)) return;
+    if (this.get("apply").disabled || (hash === this.hash && mayCommand === this.mayCommand)) return;
     const isShown = hash === this.form?.hash && mayCommand === this.mayCommand;
     this.hash = hash;
     this.mayCommand = mayCommand;
@@ -58,11 +57,11 @@ export class Settings {
   async apply() {
     const changed = this.fields.filter((field) => field.isChanged);
     const values = Object.fromEntries(changed.map((field) => [field.spec.key, field.value]));
-    this.isApplying = this.get("apply").disabled = true;
+    this.get("apply").disabled = true;
     this.#note("Checking …");
     const answer = await this.connection.ask({ do: "edit", hash: this.form.hash, law: this.law.value, values });
     if (answer.ok) await this.load();
-    this.isApplying = this.get("apply").disabled = false;
+    this.get("apply").disabled = false;
     if (answer.ok) {
       this.#note("In force.");
       return;
