@@ -377,9 +377,12 @@ def test_who_disarms_a_device_that_does_not_let_go_is_told(browser: Browser) -> 
         page.wait_for("document.getElementById('answer').innerText.includes('the force may still be there')")
 
 
-def test_a_daemon_that_has_gone_is_said(browser: Browser, served: Served, daemon: Daemon) -> None:
-    """The last test of this daemon."""
-    with browser.page(served.command) as page:
+def test_a_daemon_that_has_gone_is_said(browser: Browser) -> None:
+    with (
+        Daemon(CONFIG) as daemon,
+        Served(daemon.wait_ready().directory / "run") as served,
+        browser.page(served.command) as page,
+    ):
         page.wait_inside("page.store.ring.end > 100")
         daemon.process.terminate()
         state(page, "No daemon")
