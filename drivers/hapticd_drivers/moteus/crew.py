@@ -31,7 +31,7 @@ from hapticd_drivers.moteus.registers import (
     VOLTAGE,
     VOLTS,
 )
-from hapticd_drivers.motors.crew import GREETING_PATIENCE_S, Crew, Metered, Motor
+from hapticd_drivers.motors.crew import GREETING_PATIENCE_S, Crew, Metered, Motor, NoWatchdogError
 from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.motors.link import BusLink
 
@@ -263,7 +263,7 @@ class MoteusCrew(Crew):
         end_s = time.monotonic() + 2.0 * self._watchdog_s + PREPARING_S
         while not all(motor.mode == TIMED_OUT for motor in self._motors):
             if time.monotonic() > end_s:
-                raise DeviceFaultError(
+                raise NoWatchdogError(
                     f"{self._name}: a controller on {self.link.where} goes on without a command for "
                     f"{1e3 * self._watchdog_s:g} ms: update its firmware"
                 )

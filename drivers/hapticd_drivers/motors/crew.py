@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar, Protocol
 
-from hapticd.errors import DeviceTimeoutError, DriverError
+from hapticd.errors import DeviceFaultError, DeviceTimeoutError, DriverError
 from hapticd_drivers.motors.link import BusLink
 from hapticd_drivers.motors.metrics import (
     ANSWER_US,
@@ -29,6 +29,10 @@ GREETING_PATIENCE_S = 1.0
 
 RESTARTED_S = 0.05
 """A controller that says nothing for this time may have been switched off and on, and count from elsewhere [s]."""
+
+
+class NoWatchdogError(DeviceFaultError):
+    """A controller goes on when nothing is said to it."""
 
 
 class Metered(Protocol):
@@ -177,8 +181,8 @@ class Crew(ABC):
         """Say nothing while torques of 0 hold, and see that the motors let go by themselves in time.
 
         Raises:
-            DeviceFaultError: one does not.
-            DriverError: one is silent or gone.
+            NoWatchdogError: one does not.
+            DriverError: one is silent, faulty or gone.
         """
 
     @abstractmethod

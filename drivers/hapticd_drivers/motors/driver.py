@@ -17,7 +17,7 @@ from hapticd.errors import (
 )
 from hapticd.trace import DriverTrace
 from hapticd_drivers.claims import Claims
-from hapticd_drivers.motors.crew import RESTARTED_S, Crew
+from hapticd_drivers.motors.crew import RESTARTED_S, Crew, NoWatchdogError
 from hapticd_drivers.motors.drum import Drum
 from hapticd_drivers.motors.link import BusLink, TracedLink
 from hapticd_drivers.motors.metrics import METRICS, TICKS_WITHOUT_STATE
@@ -64,6 +64,7 @@ class MotorDriver(Driver[MotorOptionsT]):
         self._restarted_ticks = round(RESTARTED_S / period_s)
         self._silent = 0
         self._sign = Sign(self.NAME, options.sign_checked)
+        self._no_watchdog = ""  # what a calibration has found, until one finds otherwise
         self._lock = threading.Lock()  # a calibration talks to the motors beside the loop
 
     @classmethod
@@ -149,6 +150,8 @@ class MotorDriver(Driver[MotorOptionsT]):
                 "which moves the arm"
             )
         self._sign.demand()
+        if self._no_watchdog:
+            raise DriverStateError(f"{self._no_watchdog}; then `hapticd calibrate`, which moves the arm")
         with self._lock:
             crew = self._opened()
             crew.enable()
@@ -243,12 +246,14 @@ class MotorDriver(Driver[MotorOptionsT]):
             try:
                 crew.disable()
                 self._mark(crew)
-                crew.prove_watchdog()
+                self._prove_watchdog(crew)
                 crew.enable()
-                for index in range(len(self._drums)):
-                    self._calibrate_axis(mover, index)
+                places = [self._calibrate_axis(mover, index) for index in range(len(self._drums))]
             finally:
                 crew.disable()
+            for drum, place in zip(self._drums, places, strict=True):
+                if place is not None:
+                    drum.put(*place)
             homes = [
                 None if drum.options.homing == "absolute" else drum.turns(drum.options.home_m) for drum in self._drums
             ]
@@ -263,6 +268,14 @@ class MotorDriver(Driver[MotorOptionsT]):
             self._accept()
             crew.ask()
 
+    def _prove_watchdog(self, crew: Crew) -> None:
+        try:
+            crew.prove_watchdog()
+        except NoWatchdogError as error:
+            self._no_watchdog = str(error)
+            raise
+        self._no_watchdog = ""
+
     def _mark(self, crew: Crew) -> None:
         """Have a restart be seen from here on, also of a controller that does not tell."""
         for index, (drum, motor) in enumerate(zip(self._drums, crew.motors, strict=True)):
@@ -271,7 +284,8 @@ class MotorDriver(Driver[MotorOptionsT]):
                 _forget_home(drum)
                 drum.put(crew.mark(index), at_m)
 
-    def _calibrate_axis(self, mover: MotorMover, index: int) -> None:
+    def _calibrate_axis(self, mover: MotorMover, index: int) -> tuple[float, float] | None:
+        """Check one axis, and find where the shaft is [turns] when the handle is at some place [m]; None: it knows."""
         drum = self._drums[index]
         options = drum.options
         force_n = min(self.options.calibration_force_n, drum.max_force_n, self.info.max_force_n)
@@ -288,12 +302,11 @@ class MotorDriver(Driver[MotorOptionsT]):
         )
         self._sign.check(drive)
         if options.homing == "absolute":
-            return
+            return None
         if options.homing == "here":
-            counts, at_m = motion.here(drive), options.home_m
-        else:
-            counts, at_m = motion.find_stop(drive, -1.0 if options.homing == "low_stop" else 1.0), _end_m(drum)
-        drum.put(counts / COUNTS_PER_TURN, at_m)
+            return motion.here(drive) / COUNTS_PER_TURN, options.home_m
+        towards = -1.0 if options.homing == "low_stop" else 1.0
+        return motion.find_stop(drive, towards) / COUNTS_PER_TURN, _end_m(drum)
 
     def _opened(self) -> Crew:
         assert self._crew is not None

@@ -6,7 +6,7 @@ import struct
 import time
 
 from hapticd.errors import DeviceFaultError, DeviceProtocolError, DeviceTimeoutError, DriverError
-from hapticd_drivers.motors.crew import GREETING_PATIENCE_S, Crew, Metered, Motor
+from hapticd_drivers.motors.crew import GREETING_PATIENCE_S, Crew, Metered, Motor, NoWatchdogError
 from hapticd_drivers.motors.link import BusLink
 from hapticd_drivers.odrive import cansimple
 from hapticd_drivers.odrive.cansimple import (
@@ -186,7 +186,7 @@ class OdriveCrew(Crew):
             left_s = end_s - time.monotonic()
             if left_s <= 0.0:
                 without = ", ".join(str(motor.address) for motor in self._motors if not motor.error & WATCHDOG_EXPIRED)
-                raise DeviceFaultError(
+                raise NoWatchdogError(
                     f"{self._name}: ODrive {without} goes on when nothing is said to it for "
                     f"{1e3 * self._watchdog_s:g} ms: set axis0.config.enable_watchdog = True and "
                     f"axis0.config.watchdog_timeout = {self._watchdog_s:g}, and save (docs/odrive.md)"

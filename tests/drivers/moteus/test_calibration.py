@@ -472,6 +472,37 @@ def test_a_motor_without_supply_does_not_pass(bench: Lab) -> None:
     driver.close()
 
 
+def test_a_calibration_that_fails_at_the_second_axis_leaves_the_home_of_the_first_where_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was moved to where the handle was, and could be armed so until hapticd was started anew."""
+    be_patient(monkeypatch)
+    with Lab("fdcanusb", tmp_path, 2, monkeypatch) as bench:
+        driver = bench.driver(axes=axes(2, homing="here"))
+        driver._state_wait_s = PATIENCE_S
+        driver.open()
+        motors = driver._opened()
+        motors.set_home([motor.turns for motor in motors.motors])
+        driver.close()
+        driver.open()
+        bench.first.shaft.x_m += 0.02
+        for _ in range(2):
+            before_m = driver.read().position_m[0]
+
+        def held(drive: motion.Drive) -> None:
+            if drive.axis == 1:
+                raise DeviceFaultError("held")
+
+        monkeypatch.setattr(motion, "check_sign", held)
+        monkeypatch.setattr(moteus_crew.MoteusCrew, "prove_watchdog", lambda crew: crew.enable())
+        with pytest.raises(DeviceFaultError, match="held"):
+            driver.calibrate()
+        for _ in range(2):
+            assert driver.read().position_m[0] == pytest.approx(before_m, abs=1e-4)
+        assert before_m == pytest.approx(0.02, abs=1e-4)
+        driver.close()
+
+
 def test_it_ends_without_force_when_it_is_called_off(bench: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     driver = opened(bench)
     find_stop = motion.find_stop

@@ -144,6 +144,21 @@ def test_an_odrive_without_the_watchdog_that_is_declared_does_not_pass(bench: La
     driver.close()
 
 
+def test_a_watchdog_that_a_calibration_has_disproved_is_believed_no_more(bench: Lab) -> None:
+    """Home and sign are known without one: it armed all the same, and kept its force when the computer fell silent."""
+    bench.first.watchdog_s = 0.0
+    driver = bench.driver(watchdog_ms=200.0)
+    driver.open()
+    with pytest.raises(DeviceFaultError, match="enable_watchdog = True"):
+        driver.calibrate()
+    with pytest.raises(DriverStateError, match=r"enable_watchdog = True.*`hapticd calibrate`"):
+        driver.enable()
+    bench.first.watchdog_s = 0.2
+    driver.calibrate()
+    driver.enable()
+    driver.close()
+
+
 def test_a_motor_that_pushes_the_wrong_way_is_refused(bench: Lab) -> None:
     bench.first.shaft.motor = -1.0
     driver = bench.driver(sign_checked=False, watchdog_ms=200.0)
