@@ -78,6 +78,7 @@ class Inverse3(Driver[Inverse3Options]):
         self._most_silent = max(SILENT_TICKS, round(SILENCE_S / period_s))
         self._silent = 0
         self._seen = 0
+        self._nonsense = ""  # of the last message that made none
 
     @classmethod
     def find(cls, options: Inverse3Options | None = None) -> list[FoundDevice]:
@@ -204,9 +205,13 @@ class Inverse3(Driver[Inverse3Options]):
         while courier.waiting and courier.failed is None and time.monotonic() < end_s:
             courier.wait(courier.exchanges, min(0.005, patience_s))
         # A new state may answer the message before, with the force that it set.
-        if (courier.waiting and courier.failed is None) or not self._take(courier):
+        if courier.waiting and courier.failed is None:
             raise DeviceTimeoutError(
                 f"inverse3: the service at {self.options.url} did not answer within {patience_s:g} s: is it overloaded?"
+            )
+        if not self._take(courier):
+            raise DeviceProtocolError(
+                f"inverse3: what the service at {self.options.url} answers makes no sense: {self._nonsense}"
             )
 
     def _take(self, courier: Courier) -> bool:
@@ -219,8 +224,9 @@ class Inverse3(Driver[Inverse3Options]):
         self._seen = count
         try:
             state = messages.state(courier.newest, self._device)
-        except ValueError:
+        except ValueError as error:
             self.metrics[BAD] += 1.0
+            self._nonsense = str(error)
             return False
         if state is None:
             raise DeviceDisconnectedError(

@@ -24,8 +24,8 @@ CLASSIC = struct.Struct("=IB3x8s")
 FD = struct.Struct("=IBB2x64s")
 """struct can_frame and struct canfd_frame of <linux/can.h>."""
 
-MOST_FRAMES = 64
-"""Most that are taken at once."""
+MOST_FRAMES = 512
+"""Most that are taken at once, more than the kernel keeps: of what is left over a tick would believe an older place."""
 
 
 class SocketCanLink:
@@ -95,10 +95,13 @@ class SocketCanLink:
         with contextlib.suppress(OSError):
             self._socket.close()
 
-    def _gone(self, error: OSError) -> DeviceDisconnectedError:
+    def _gone(self, error: OSError) -> DriverError:
+        look = f"`hapticd devices {self._driver}` has the lines that bring it up"
+        if self._fd and error.errno == errno.EINVAL:
+            return DeviceNotFoundError(f"{self._driver}: the CAN interface {self.where} is up without CAN-FD: {look}")
         return DeviceDisconnectedError(
             f"{self._driver}: the CAN interface {self.where} is gone or down ({error.strerror}): plug the adapter in "
-            f"again, then bring it up: ip link set {self.where} up"
+            f"again; {look}"
         )
 
 

@@ -19,6 +19,7 @@ from hapticd.errors import (
     DeviceBusyError,
     DeviceDisconnectedError,
     DeviceNotFoundError,
+    DeviceProtocolError,
     DeviceTimeoutError,
     DriverError,
 )
@@ -240,6 +241,13 @@ def test_a_message_that_makes_no_sense_is_counted_and_not_believed(service: Fake
         assert driver.read().position_m == pytest.approx(x_m, abs=1e-3)
     assert driver.metrics[BAD] == 1
     driver.close()
+
+
+def test_a_service_that_answers_nonsense_is_not_said_to_be_silent(service: FakeService) -> None:
+    """Such as the orientation of a grip that is none: the advice was to look for what overloads the service."""
+    service.spoil.append('{"inverse3":[{"device_id":"049D"}]}')
+    with pytest.raises(DeviceProtocolError, match="makes no sense: a device without a state"):
+        opened(service)
 
 
 def test_a_place_that_is_no_number_is_no_place(service: FakeService) -> None:

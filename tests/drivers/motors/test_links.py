@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import pty
 import re
@@ -192,9 +194,40 @@ def test_frames_that_are_no_data_are_left_out() -> None:
     assert made.receive() == [(0x123, b"\x05\x06")]
     assert made.damaged == 3
     far.close()
-    with pytest.raises(DeviceDisconnectedError, match="ip link set can0 up"):
+    with pytest.raises(DeviceDisconnectedError, match="`hapticd devices test`"):
         made.receive()
     made.close()
+
+
+def test_what_a_loop_that_stood_still_missed_is_taken_at_once() -> None:
+    """Of three ODrives 25 ms are 80 frames: what was left of them came a tick later, and a place of before was new."""
+    near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    far.setblocking(False)
+    made = SocketCanLink("test", "can0", False, near)
+    sent = 0
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            far.send(socketcan.CLASSIC.pack(0x009, 4, sent.to_bytes(4, "little")))
+            sent += 1
+    assert sent > 200
+    assert made.receive()[-1] == (0x009, (sent - 1).to_bytes(4, "little"))
+    made.close()
+    far.close()
+
+
+def test_an_interface_that_is_up_without_can_fd_is_said_to_be() -> None:
+    """The kernel takes no such frame there (EINVAL); the adapter was said to be gone."""
+
+    class ClassicSocket(socket.socket):
+        def send(self, *_: object) -> int:
+            raise OSError(errno.EINVAL, "Invalid argument")
+
+    near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    made = SocketCanLink("test", "can0", True, ClassicSocket(fileno=near.detach()))
+    with pytest.raises(DeviceNotFoundError, match="without CAN-FD: `hapticd devices test`"):
+        made.send(0x8001, bytes(48))
+    made.close()
+    far.close()
 
 
 def test_an_interface_that_takes_no_more_drops_the_frame() -> None:
