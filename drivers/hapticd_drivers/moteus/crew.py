@@ -153,6 +153,7 @@ class MoteusCrew(Crew):
         self._by_identifier = {motor.address << 8: motor for motor in motors}
         self._watchdog_s = watchdog_s
         self._let_go = registers.SHORTED if brake else registers.STOP
+        self._letting_go = False  # to have let go, none needs to know where it is
         self._enabled_ns = 0
 
     @property
@@ -319,11 +320,15 @@ class MoteusCrew(Crew):
         )
 
     def _have_let_go(self, urgent: bool) -> None:
-        self._say_until(
-            lambda index: self._send(index, self._let_go),
-            lambda index: self._motors[index].heard and self._motors[index].mode in _WITHOUT_FORCE,
-            urgent,
-        )
+        self._letting_go = True
+        try:
+            self._say_until(
+                lambda index: self._send(index, self._let_go),
+                lambda index: self._motors[index].heard and self._motors[index].mode in _WITHOUT_FORCE,
+                urgent,
+            )
+        finally:
+            self._letting_go = False
 
     def _send_no_torque(self, index: int) -> None:
         self._send(index, registers.torque(0.0, self._motors[index].most_n_m, self._watchdog_s))
@@ -370,7 +375,7 @@ class MoteusCrew(Crew):
                 motor.firmware = f"{int(found[FIRMWARE]):x}"
         except (KeyError, ValueError):  # half of what was asked for, or not a number where there is always one
             return False
-        if math.isnan(motor.turns):
+        if math.isnan(motor.turns) and not self._letting_go:
             raise DeviceProtocolError(
                 f"{self._name}: controller {motor.address} does not know where its shaft is: check its encoder (tview)"
             )

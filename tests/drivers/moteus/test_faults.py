@@ -90,9 +90,13 @@ def test_a_place_that_is_no_number_is_no_place(bench: Lab) -> None:
     driver = pressing(bench)
     bench.first.position = float("nan")
     ticks_until(driver, DriverError, "does not know where its shaft is")
-    bench.first.position = 1e9
     driver.disable()
+    assert driver.force_left == ""
+    assert all(one.torque_n_m == 0.0 for one in bench.controllers)
     driver.close()
+    assert driver.force_left == ""
+    with pytest.raises(DriverError, match="does not know where its shaft is"):
+        bench.driver().open()
     bench.first.position = None
 
 
