@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import stat
 import tempfile
 import time
@@ -222,6 +223,37 @@ def test_there_are_subscribers_from_the_first_to_the_last() -> None:
         assert doors.state.subscribed
         two.socket.setsockopt(zmq.UNSUBSCRIBE, b"")
         doors.until(lambda: not doors.state.subscribed)
+
+
+def test_one_that_ends_what_it_has_never_subscribed_to_takes_nothing_from_the_others() -> None:
+    """ZeroMQ tells of the end of a subscription then, as it does of the last one: no subscriber heard anything more."""
+    with opened() as doors, socket.socket(socket.AF_UNIX) as raw:
+        path = str(doors.directory / "state")
+        good = doors.client(zmq.SUB, f"ipc://{path}")
+        doors.until(lambda: good.received() and doors.state.subscribed)
+        raw.connect(path)
+        raw.sendall(b"\xff" + bytes(7) + b"\x01\x7f\x03\x00NULL".ljust(24, b"\0") + bytes(32))  # ZMTP 3.0
+        raw.sendall(b"\x04\x19\x05READY\x0bSocket-Type\0\0\0\x03SUB")
+        assert len(raw.recv(66, socket.MSG_WAITALL)) == 66  # what is said before it has said hello ends a connection
+        raw.sendall(b"\x00\x01\x00" + b"\x00\x04\x01odd" * (MOST_ODD + 1))  # at the last of which it is disconnected
+        raw.setblocking(False)
+        doors.until(lambda: ended(raw))
+        assert doors.state.subscribed
+        good.received()
+        doors.until(good.received)
+        doors.clients.remove(good)
+        good.close()
+        doors.until(lambda: not doors.state.subscribed)
+
+
+def ended(raw: socket.socket) -> bool:
+    """Whether the other end of a connection has closed it."""
+    try:
+        return not raw.recv(1 << 16)
+    except BlockingIOError:
+        return False
+    except ConnectionError:
+        return True
 
 
 def test_who_subscribes_to_what_there_is_not_is_disconnected_and_others_are_not() -> None:
