@@ -89,7 +89,8 @@ class Recording:
     @property
     def missing(self) -> int:
         """Ticks that did not arrive, by the topic that lost most."""
-        return max((sum(gap.missing for gap in self.gaps if gap.topic == one.topic) for one in self.gaps), default=0)
+        topics = {gap.topic for gap in self.gaps}
+        return max((sum(gap.missing for gap in self.gaps if gap.topic == topic) for topic in topics), default=0)
 
     @cached_property
     def ticks(self) -> dict[str, Values]:
