@@ -174,6 +174,21 @@ def test_without_the_token_nothing_is_commanded(served: Served, daemon: Daemon, 
     assert daemon.config.read_text() == CONFIG
 
 
+def test_what_was_asked_for_long_ago_is_not_done_but_for_disarming(served: Served, daemon: Daemon) -> None:
+    """A server that stood still armed the device when it went on, however long after the button was pressed."""
+    with viewer(served, served.token) as socket:
+        now = json.loads(socket.recv(PATIENCE_S))["now"]
+        assert answered(socket, {"do": "disarm", "now": now - 60.0})["ok"] is True
+        form = answered(socket, {"do": "form", "now": now - 60.0})["form"]
+        edit = {"do": "edit", "hash": form["hash"], "law": "none", "values": {}}
+        for request in ({"do": "arm"}, {"do": "clear"}, edit):
+            answer = answered(socket, {**request, "now": now - 60.0})
+            assert answer["ok"] is False
+            assert re.fullmatch(r"was asked for \d\d s ago, and so is not done any more", answer["text"])
+        assert daemon.config.read_text() == CONFIG
+        assert answered(socket, {"do": "arm", "now": now})["ok"] is True
+
+
 @pytest.mark.parametrize(
     "message",
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -375,6 +376,32 @@ def test_who_disarms_a_device_that_does_not_let_go_is_told(browser: Browser) -> 
         rig.order("keeps")
         page.click("#disarm")
         page.wait_for("document.getElementById('answer').innerText.includes('the force may still be there')")
+
+
+def test_a_server_that_says_nothing_is_no_link(browser: Browser, daemon: Daemon) -> None:
+    """The page showed its last state as the present one, and what was pressed had no answer."""
+    with Served(daemon.directory / "run") as served, browser.page(served.command) as page:
+        state(page, "Armed")
+        served.process.send_signal(signal.SIGSTOP)
+        try:
+            page.click("#arm")
+            state(page, "No link")
+            assert "server has gone" in page.evaluate("document.getElementById('answer').innerText")
+        finally:
+            served.process.send_signal(signal.SIGCONT)
+        state(page, "Armed")
+
+
+def test_a_page_that_is_open_for_weeks_draws_on(page: Page) -> None:
+    """Rows were counted in 32 bits where a pixel has many: after 12 days at 1 kHz half of the points had no time."""
+    times = page.evaluate(
+        "Promise.all([import('/ring.js'), import('/decimate.js')]).then(([{ Ring }, { decimated }]) => {"
+        " const ring = new Ring(1, 1000); ring.end = 2 ** 30;"
+        " for (let i = 0; i < 1000; i++) ring.push(i, i, null);"
+        " return decimated(ring, 0, 1000, ['x0'], 100).t; })"
+    )
+    assert len(times) > 100
+    assert None not in times
 
 
 def test_a_daemon_that_has_gone_is_said(browser: Browser) -> None:

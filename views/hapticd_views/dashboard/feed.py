@@ -20,6 +20,9 @@ FRAMES_HZ = 30
 SILENT_S = 2.5
 """After how long without a status a daemon counts as silent, and is looked for elsewhere [s]."""
 
+ALIVE_S = 1.0
+"""How often viewers are told the time, by which they know that the server is there [s]."""
+
 _AGAIN_S = 1.0  # before a connection that was given up is tried again
 _MOST_AT_ONCE = 400  # messages; viewers and commands have their turn in between
 
@@ -46,7 +49,7 @@ class Feed:
         self._every_ticks = 1
         self._client: Client | None = None
         self._heard_s = time.monotonic()
-        self._again_s = 0.0
+        self._again_s = self._alive_s = 0.0
         self._doubt(f"looking for the daemon {target.telemetry or target.instance}")
 
     async def run(self) -> None:
@@ -85,6 +88,9 @@ class Feed:
                 self.history.add_note(kind, note)
         if notes["cycles"] or notes["events"]:
             self._send({"notes": notes})
+        if time.monotonic() >= self._alive_s:
+            self._alive_s = time.monotonic() + ALIVE_S
+            self._send({"now": time.monotonic()})
 
     def _connected(self) -> Client | None:
         """The subscription, made when there is none; None while it is too early to try again."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
@@ -20,25 +21,29 @@ class Hello(Table):
     token: str = Field("", max_length=100)
 
 
-class Command(Table):
+class _Asked(Table):
+    """What is answered: its number, and the newest time of the server that the page had heard of when it asked [s]."""
+
+    id: int = 0
+    now: float = math.inf
+
+
+class Command(_Asked):
     """One of the buttons."""
 
     do: Literal["arm", "disarm", "clear"]
-    id: int = 0
 
 
-class FormRequest(Table):
+class FormRequest(_Asked):
     """The form as the file is now."""
 
     do: Literal["form"]
-    id: int = 0
 
 
-class Edit(Table):
+class Edit(_Asked):
     """The form, filled in: a law and the values that differ."""
 
     do: Literal["edit"]
-    id: int = 0
     hash: str = Field(max_length=100)
     law: str = Field(min_length=1, max_length=200)
     values: dict[str, bool | int | float | str | None] = Field(default_factory=dict, max_length=200)

@@ -6,6 +6,7 @@ import asyncio
 import errno
 import logging
 import secrets
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from http import HTTPStatus
@@ -32,6 +33,9 @@ LIVE = "/live"
 
 HELLO_S = 5.0
 """How long a page may take to say hello [s]."""
+
+EXPIRES_S = 5.0
+"""What a page asked for longer ago than this is not done any more [s]; disarming is."""
 
 MOST_ASKED = {"disarm": 32}
 """Requests of a page that may wait for their answers; 4 of those that are not named here."""
@@ -124,7 +128,8 @@ class Dashboard:
                 return
         except (TimeoutError, ConnectionClosed):
             return
-        viewer.answer({"hello": {"version": __version__, "keep_s": KEEP_S, "may_command": viewer.may_command}})
+        told = {"version": __version__, "keep_s": KEEP_S, "may_command": viewer.may_command}
+        viewer.answer({"now": time.monotonic(), "hello": told})
         self._knocking.welcome(connection)
         self._audience.join(viewer, self._feed.history.messages())
         sending = asyncio.create_task(viewer.run())
@@ -165,6 +170,9 @@ class Dashboard:
         viewer.answer({"answer": asked.id, **said})
 
     def _do(self, asked: Command | FormRequest | Edit) -> dict[str, Any]:
+        age_s = time.monotonic() - asked.now  # it may have waited for the network, or for a server that stood still
+        if age_s > EXPIRES_S and not isinstance(asked, FormRequest) and asked.do != "disarm":
+            raise ClientError(f"was asked for {age_s:.0f} s ago, and so is not done any more")
         match asked:
             case Command():
                 self._target.ask(asked.do)

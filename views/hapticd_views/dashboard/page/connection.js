@@ -2,6 +2,7 @@
 
 const PLACE = "hapticd-token";
 const FIRST_WAIT_MS = 300, LONGEST_WAIT_MS = 5000;
+const SILENT_MS = 5000; // the server tells the time each second
 
 /** The token behind the # of the address: kept for this tab, and taken out of sight. */
 function takeToken() {
@@ -22,20 +23,17 @@ export class Connection {
     this.asked = new Map();
     this.lastId = 0;
     this.open();
+    setInterval(() => { if (performance.now() - this.heardMs > SILENT_MS) this.#lose(""); }, 500);
   }
 
   open() {
+    this.heardMs = performance.now();
+    this.now = undefined; // of the server
     this.socket = new WebSocket(`ws://${location.host}/live`);
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => this.socket.send(JSON.stringify({ do: "hello", token: this.token }));
     this.socket.onmessage = ({ data }) => this.#take(data);
-    this.socket.onclose = ({ code, reason }) => {
-      for (const answer of this.asked.values()) answer({ ok: false, text: "the dashboard's server has gone" });
-      this.asked.clear();
-      this.heard.onClose(code === 4401 ? reason : "");
-      setTimeout(() => this.open(), this.waitMs);
-      this.waitMs = Math.min(LONGEST_WAIT_MS, this.waitMs * 2);
-    };
+    this.socket.onclose = ({ code, reason }) => this.#lose(code === 4401 ? reason : "");
   }
 
   /** Ask for something; the answer, which has `ok` and, when that is false, `text` or `problems`. */
@@ -44,11 +42,24 @@ export class Connection {
       return Promise.resolve({ ok: false, text: "no connection to the dashboard's server" });
     }
     const id = ++this.lastId;
-    this.socket.send(JSON.stringify({ ...request, id }));
+    this.socket.send(JSON.stringify({ ...request, id, now: this.now }));
     return new Promise((resolve) => this.asked.set(id, resolve));
   }
 
+  /** The connection has gone, or the server is silent: one that stands still, or a cut cable, ends none. */
+  #lose(reason) {
+    this.heardMs = Infinity;
+    this.socket.onclose = this.socket.onmessage = null;
+    this.socket.close();
+    for (const answer of this.asked.values()) answer({ ok: false, text: "the dashboard's server has gone" });
+    this.asked.clear();
+    this.heard.onClose(reason);
+    setTimeout(() => this.open(), this.waitMs);
+    this.waitMs = Math.min(LONGEST_WAIT_MS, this.waitMs * 2);
+  }
+
   #take(data) {
+    this.heardMs = performance.now();
     if (data instanceof ArrayBuffer) {
       this.heard.onTicks(data);
       return;
@@ -59,6 +70,7 @@ export class Connection {
       this.asked.delete(message.answer);
       return;
     }
+    this.now = message.now ?? this.now;
     if ("hello" in message) this.waitMs = FIRST_WAIT_MS;
     for (const [name, value] of Object.entries(message)) this.heard.onMessage(name, value);
   }

@@ -39,7 +39,7 @@ function binned(ring, from, to, names, size) {
     bins.push([Math.max(start, from), Math.min(start + size, to)]);
   }
   const t = [];
-  for (const [begin, end] of bins) t.push(ring.time(begin), ring.time((begin + end) >> 1));
+  for (const [begin, end] of bins) t.push(ring.time(begin), ring.time(Math.floor((begin + end) / 2)));
   const columns = {};
   for (const name of names) {
     const source = ring.columns[name], target = [];
