@@ -82,7 +82,7 @@ class Follower(threading.Thread):
         """
         try:
             async with asyncio.timeout(ABSENT_S):
-                while (newest := self._newest) is None or newest.seq == seq:
+                while (newest := self._newest) is None or newest.seq == seq or self._is_silent():
                     came = self._came
                     self._asked = True
                     if self._newest is newest:  # else it has come since, and the thread may not have seen the question
@@ -90,6 +90,10 @@ class Follower(threading.Thread):
                 return newest
         except TimeoutError:
             return None
+
+    def _is_silent(self) -> bool:
+        """Whether the newest tick is an old one: the thread may have ended with the pipe that it tells trouble to."""
+        return time.monotonic() - self._heard_s > ABSENT_S
 
     def end(self) -> None:
         """Hand over the force that waits, and end."""
@@ -118,7 +122,7 @@ class Follower(threading.Thread):
             if self._asked:
                 self._asked = False
                 self._loop.call_soon_threadsafe(self._wake)
-        elif now_s - self._heard_s > ABSENT_S:
+        elif self._is_silent():
             self._newest = None
 
     def _hand_over(self) -> None:
