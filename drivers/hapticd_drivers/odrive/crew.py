@@ -39,7 +39,10 @@ OBEYS_S = 0.1
 """An ODrive that was enabled says within this time that it follows [s]; until then it may not, and gives no torque."""
 
 WATCHDOG_MARGIN = 1.5
-"""A watchdog has to act within this many times its own time, when a calibration tries it."""
+"""A watchdog has to act within this many times its own time and 2 `HEARTBEAT_S`, when a calibration tries it.
+
+By a computer that is busy no less can be told: heartbeats say that it has acted, not when.
+"""
 
 
 class OdriveMotor(Motor):
