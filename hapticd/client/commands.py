@@ -25,7 +25,6 @@ STOP_TIMEOUT_S = 15.0
 CALIBRATION_TIMEOUT_S = 120.0
 """How long a device may take to calibrate [s]."""
 
-
 _LOOK_S = 0.1  # how often it is seen whether the daemon is still there
 
 _LATER = ("arm", "calibrate", "tare", "clear")  # what may have to wait, and must not be done when it is too late

@@ -100,7 +100,7 @@ class ArmHold:
             self._keep(loop, held=True)
 
     def keep(self, loop: LoopProcess) -> None:
-        """Hold it: the loop is lost, and with it what it knew."""
+        """Hold it: somebody has asked for that, or the loop is lost, and with it what it knew."""
         self._keep(loop, held=True)
 
     def end(self) -> None:

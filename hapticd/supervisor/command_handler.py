@@ -80,9 +80,10 @@ class CommandHandler:
         answer = answer or _unanswered
         if not state.recovery.lost:
             state.requests.disarm(answer, wait=wait)
+            state.arm_hold.keep(state.loop)  # now: as the daemon ends, no turn does it
             return
         state.recovery.amend(replace(state.recovery.resume, may_arm=False))
-        state.arm_hold.follow_lost(state.loop, state.recovery.resume)
+        state.arm_hold.keep(state.loop)
         state.tell(EventCode.DISARMED, "the device stays disarmed when it is back")
         state.requests.hold(answer)
         self._settle()  # at once where that can be: by the next turn there may be another loop, with a queue of its own

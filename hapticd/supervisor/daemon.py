@@ -295,7 +295,7 @@ class Daemon:
         state = self.state
         if state.recovery.lost:
             state.arm_hold.follow_lost(state.loop, state.recovery.resume)
-        else:
+        elif not state.requests.disarming:  # it is held, and the newest tick may not know of that
             state.arm_hold.follow(state.loop, state.status.flags, state.config, any(state.status.origin_m.values()))
 
     def _look_after_loop(self, now_s: float) -> None:

@@ -34,10 +34,8 @@ LIVE: Final = (
 )
 """Tables and keys that may change while the loop runs; everything else needs a restart."""
 
-
 CLOSE_S = 1.0
 """How long a law that is being imported may hold up the end of the daemon [s]."""
-
 
 CHECK_S = 120.0
 """How long a law may take to be imported before the file that names it counts as one that cannot be used [s]."""

@@ -52,6 +52,11 @@ class RequestQueue:
         self._let_go_by = inf  # the record after which it has: the first one that was seen without a force
         self._held: list[Answer] = []  # to disarm or stop, until it is known what became of the force
 
+    @property
+    def disarming(self) -> bool:
+        """Whether somebody has asked to disarm and has no answer yet."""
+        return bool(self._disarming or self._disarmed or self._letting_go)
+
     def submit(self, request: dict[str, Any], answer: Answer, by_ns: int | None = None) -> None:
         """Queue a request; its answer comes from a later `turn`.
 

@@ -257,7 +257,6 @@ Bin 0 counts ticks less than 10 us late, bin i those from edge i-1 to below edge
 10.24 ms and more.
 """
 
-
 LATE_US = 160
 """Ticks that started this late or later are called late [us]; an edge of the histogram."""
 

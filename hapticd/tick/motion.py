@@ -25,7 +25,6 @@ MOST_M_PER_S = 1e6
 MARGIN = 0.5
 """How far outside its declared workspace, as a share of its size, a device may claim to be."""
 
-
 FROZEN_S = 0.02
 FROZEN_SAMPLES = 20
 LEAST_REPEATS = 3

@@ -9,9 +9,12 @@ import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
+from unittest.mock import Mock
 
+import msgpack
 import pytest
+import zmq
 
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import HapticdError
@@ -19,9 +22,10 @@ from hapticd.loop.memory import DISARM, FIELDS, LAW_CODE, MAY_ARM, PORT_LAW_CODE
 from hapticd.loop.resume import FROM_START, ResumeState
 from hapticd.supervisor import arm_hold
 from hapticd.supervisor.arm_hold import EDITED, UNKEPT, ArmHold
+from hapticd.supervisor.daemon import Daemon
 from hapticd.tick.event import EventCode
 from hapticd.tick.flags import Flag
-from tests.daemon.running import wait_until
+from tests.daemon.running import PATIENCE_S, wait_until
 from tests.faults.rig import Rig, anew_where_late, events_until
 from tests.remote.stage import remote_pid
 
@@ -36,6 +40,25 @@ def disarmed(rig: Rig) -> None:
 def disarmed_and_stopped(rig: Rig) -> None:
     assert rig.ask("disarm")["ok"]
     assert rig.ask("stop")["ok"]
+
+
+def ask_at_once(rig: Rig, *requests: str) -> None:
+    with zmq.Context() as context, context.socket(zmq.DEALER) as control:
+        control.linger = 0
+        control.connect(f"ipc://{rig.daemon.directory}/run/default/control")
+        for do in requests:
+            control.send(msgpack.packb({"do": do}))
+        for _ in requests:
+            assert control.poll(int(PATIENCE_S * 1e3)), rig.daemon.output()
+            assert msgpack.unpackb(control.recv())["ok"]
+
+
+def disarmed_as_it_stops(rig: Rig) -> None:
+    ask_at_once(rig, "disarm", "stop")
+
+
+def disarmed_while_it_stops(rig: Rig) -> None:
+    ask_at_once(rig, "stop", "disarm")
 
 
 def disarmed_while_lost(rig: Rig) -> None:
@@ -69,7 +92,13 @@ def armed_after_disarm(rig: Rig) -> None:
     assert rig.ask("stop")["ok"]
 
 
-@pytest.mark.parametrize("end", [disarmed, disarmed_and_stopped, disarmed_while_lost, latched, hanging])
+@pytest.mark.parametrize(
+    "end",
+    [
+        *(disarmed, disarmed_and_stopped, disarmed_as_it_stops, disarmed_while_it_stops),
+        *(disarmed_while_lost, latched, hanging),
+    ],
+)
 @anew_where_late
 def test_what_was_let_go_stays_so_until_it_is_armed_also_by_a_daemon_that_is_started_anew(end: Any) -> None:
     """With `safety.auto_arm` it pushed again 5 s after somebody had disarmed it."""
@@ -86,6 +115,15 @@ def test_what_was_let_go_stays_so_until_it_is_armed_also_by_a_daemon_that_is_sta
         armed(rig)
         rig.daemon.again()
         rig.pressing()
+
+
+@pytest.mark.parametrize("disarming", [False, True])
+def test_a_tick_from_before_a_disarming_is_no_arming_after_it(disarming: bool) -> None:
+    hold = Mock()
+    state = Mock(recovery=Mock(lost=False), requests=Mock(disarming=disarming), arm_hold=hold)
+    state.status.origin_m = {}
+    Daemon._hold(cast("Daemon", SimpleNamespace(state=state)))
+    assert hold.follow.called != disarming
 
 
 @pytest.mark.parametrize("end", [armed, armed_after_disarm])

@@ -68,15 +68,17 @@ class TestInTheQueue:
     def test_it_is_answered_after_the_first_record_that_shows_it(self, shared: SharedMemory) -> None:
         """Who asks for the status then does not read that the device is armed."""
         requests, answers = RequestQueue(shared), Answers()
+        assert not requests.disarming
         requests.disarm(answers.to("disarm"))
+        assert requests.disarming
         shared.words[RECORDS] = 8
         loop_disarms(shared)
         requests.turn(7)
         shared.words[RECORDS] = 9
         requests.turn(8)
-        assert answers == []
+        assert (answers, requests.disarming) == ([], True)
         requests.turn(9)
-        assert answers == ["disarm: done"]
+        assert (answers, requests.disarming) == (["disarm: done"], False)
 
     @pytest.mark.parametrize(
         ("flags", "answer"), [(0, "disarm: done"), (Flag.ARMED, f"disarm: {ARMED_SINCE}")], ids=["gone", "armed anew"]
@@ -90,6 +92,7 @@ class TestInTheQueue:
         for record in range(1, 9):
             requests.turn(record, Flag.RELEASING)
             shared.words[RECORDS] = record + 1
+            assert requests.disarming
         assert answers == []
         for record in range(9, 12):
             requests.turn(record, flags)

@@ -11,7 +11,6 @@ __all__ = ["QUIET_S", "Port", "PortState"]
 QUIET_S = 1.0
 """Shortest time between two events of one kind about one port [s]."""
 
-
 _HELD, _STALE, _RELEASED = PortState.HELD, PortState.STALE, PortState.RELEASED
 
 
