@@ -175,8 +175,8 @@ class Daemon:
         if why and not loop.force_seen_to:
             loop.force_seen_to = True
             log.error("%s; %s", why, self._take_force_away())
-            if self.release.force_left:
-                self.exit_code = 1
+        if self.release.force_left:
+            self.exit_code = 1
 
     def _rescue(self, why: str) -> None:
         """Take the force away from outside, and be ready to do so again: the daemon may go on."""
@@ -344,6 +344,7 @@ class Daemon:
         state.notifier.feed_watchdog()
         loop = state.recovery.turn(state.loop, state.config)
         if loop is not None:
+            self.release.force_left = ""
             state.take_loop(loop)
 
     def _hang_up(self) -> None:
@@ -370,7 +371,6 @@ class Daemon:
         while self._publish():
             pass
         state.event_log.recorder.loop_ended()
-        self.release.force_left = ""
         state.requests.abandon(event.text, None)  # the next turns look after its force
         state.recovery.begin(state.loop, event.text.removeprefix("device lost: "))
 

@@ -276,6 +276,20 @@ def test_who_disarms_a_device_that_does_not_let_go_hears_of_it() -> None:
         said = rig.hapticd("disarm")
         assert said.returncode == 1
         assert "the force may still be there" in said.stderr
+        assert not rig.ask("stop")["ok"]
+        assert rig.daemon.wait_exit() == 1, "as where it was stopped before that was known"
+
+
+@anew_where_late
+def test_who_stops_a_daemon_whose_device_is_back_hears_nothing_of_the_force_before_it_was_lost() -> None:
+    """For as long as that daemon ran, every stop was refused: the force may still be there."""
+    with Rig() as rig, rig.pressed().subscriber() as subscriber:
+        rig.order("keeps")
+        assert not rig.ask("disarm", wait=True)["ok"]
+        rig.mend()
+        events_until(subscriber, EventCode.DEVICE_FOUND)
+        assert rig.ask("stop") == {"ok": True, "text": ""}
+        assert rig.daemon.wait_exit() == 0
 
 
 @anew_where_late
