@@ -32,7 +32,6 @@ _MAKE_IMPORTABLE = (
     " (the configuration's directory is not searched)"
 )
 
-
 _WHOLE_NUMBER = "a whole number of TOML has 64 bits"
 _DEEPEST = 50  # tables in tables; what can be used has less than ten
 _TAKEN = re.compile(r"Cannot (?:declare|redefine namespace|mutate immutable namespace) (\(.*\))(?: twice)?")

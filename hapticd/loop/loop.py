@@ -9,7 +9,7 @@ from typing import Any
 from hapticd.config.models import LoopConfig
 from hapticd.config.safety import SafetyConfig
 from hapticd.driver import Driver, DriverState
-from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError, in_words
+from hapticd.errors import DeviceFaultError, DeviceProtocolError, DriverError, HapticdError, PluginError, in_words
 from hapticd.loop.law_budget import BUDGET_MISSES, BUDGET_TICKS, LawBudget
 from hapticd.loop.memory import (
     ANSWERED,
@@ -109,6 +109,8 @@ class ControlLoop:
         session = self.session
         try:
             session.tick.start(session.driver.read())
+        except PluginError as error:  # warmed up, but not where the device is
+            session.tick.fail_law(EventCode.LAW_FAILED, str(error))
         except HapticdError:
             raise
         except Exception as error:

@@ -163,10 +163,10 @@ class Session:
         words[MAY_ARM] = False
 
     def enable_or_tell(self) -> None:
-        """Arm, where that needs no one's word; a device that refuses stays disarmed and says why."""
+        """Arm, where that needs no one's word; a device or a law that refuses: it stays disarmed and says why."""
         try:
             self.arm()
-        except DriverError as error:
+        except (DriverError, PluginError) as error:
             self.event(EventCode.DISARMED, f"stays disarmed: {error}")
 
     def _stopped(self) -> str:

@@ -155,9 +155,8 @@ class Installation:
             InstallationError: not allowed.
         """
         self._refuse_packaged()
-        running = (
-            [unit.name for unit in unit_states() if unit.active not in ("inactive", "failed")] if self.live else []
-        )
+        units = unit_states() if self.live else []
+        running = [unit.name for unit in units if unit.active not in ("inactive", "failed")]
         if running:
             _run("systemctl", "stop", *running)
         for link in self._enabled():

@@ -60,6 +60,30 @@ def test_a_device_that_refuses_stays_disarmed_and_says_why(started: Started) -> 
     assert started.told[1].text == "stays disarmed: its button is pressed"
 
 
+@pytest.mark.parametrize("auto_arm", [False, True])
+@pytest.mark.parametrize("starts", [0, 1], ids=["where the device is", "when it is armed"])
+def test_a_law_that_cannot_start_is_a_refusal_and_no_end_of_the_loop(
+    monkeypatch: pytest.MonkeyPatch, starts: int, auto_arm: bool
+) -> None:
+    """It had started elsewhere, as loops warm up; the daemon ended, also one that had just found its device again."""
+    law = plugins.law("none")
+    left = iter(range(starts))
+
+    def start(*_: object) -> None:
+        if next(left, None) is None:
+            raise ValueError("not here")
+
+    started = Started(Clock(monkeypatch), auto_arm, WALL + '[controller]\nlaw = "none"\n')
+    started.shared.words[SUPERVISOR_BEAT] = 1 << 62
+    monkeypatch.setattr(law, "start", start)
+    started.run(lambda _number: None, 3)
+    _, *told = [(event.code, event.text.partition(" (")[0]) for event in started.told]
+    said = f"law {law.__name__} cannot start: ValueError: not here"
+    refused = [(EventCode.DISARMED, f"stays disarmed: {said}")] * auto_arm
+    assert told == (refused if starts else [(EventCode.LAW_FAILED, said)])
+    assert started.tick.guard.latched == (not starts)
+
+
 def test_a_supervisor_that_is_silent_when_the_loop_begins_costs_the_force_as_later(started: Started) -> None:
     stall_s = started.config.config.safety.supervisor_stall_s
     started.shared.words[SUPERVISOR_BEAT] = round((started.clock.now_s - stall_s - 0.1) * 1e9)
