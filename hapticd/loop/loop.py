@@ -192,10 +192,10 @@ class ControlLoop:
                 if late_ns > period_ns:  # a law's start is anybody's code, and a write may have stood still
                     tick.begin_late(late_ns * 1e-9)
                 wait = self._waiting()
+            if not driver.forces_flow and guard.mode is not disarmed:  # all of the force would be back at once
+                raise DeviceFaultError("it follows no more: see what took the force away, then arm")
             if session.arming:
                 session.go_on_arming()
-            elif not driver.forces_flow and guard.mode is not disarmed:  # all of the force would be back at once
-                raise DeviceFaultError("it follows no more: see what took the force away, then arm")
             if session.stop_requested and not self._stopping:
                 self._stopping = True
                 tick.release(min(tick.ramp_s, STOP_RAMP_S))

@@ -181,12 +181,15 @@ def test_a_device_that_never_follows_is_the_fault_that_its_driver_makes_of_it(sl
     assert slow.codes[-1] == EventCode.DEVICE_FAULT
 
 
-def test_one_that_follows_no_more_while_armed_is_a_fault_and_gets_no_force_back(slow: Slow) -> None:
+@pytest.mark.parametrize("asked", [False, True], ids=["", "as somebody asks to arm it"])
+def test_one_that_follows_no_more_while_armed_is_a_fault_and_gets_no_force_back(slow: Slow, asked: bool) -> None:
     """Telemetry went on with 10 N, and all of it came back in one tick once the device followed again."""
 
     def lapse() -> None:
         if len(slow.enabled) in (100, 110):
             slow.driver.forces_flow = len(slow.enabled) == 110
+        if len(slow.enabled) == 100 and asked:
+            slow.shared.post({"do": "arm"})
 
     slow.driver.before_read = lapse
     with pytest.raises(DeviceFaultError, match="follows no more"):
