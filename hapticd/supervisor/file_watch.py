@@ -75,7 +75,9 @@ class FileWatcher:
         try:
             text = read(self._file, files_only=True)
             if text.strip():  # an empty file is one that is about to be written
-                self._found.append(parse(text, str(self._path)))
+                saved = parse(text, str(self._path))
+                if _identity(self._file) == self._identity:  # else what was saved since may be in force already
+                    self._found.append(saved)
         except ConfigError as error:
             self._found.append(error)
         except Exception as error:  # noqa: BLE001 - whatever a plug-in's checks raise, the next save is to be seen

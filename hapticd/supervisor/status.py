@@ -176,12 +176,7 @@ class StatusBuilder:
             config_file=str(self._file),
             config_hash=config.hash,
             realtime=loop.realtime,
-            warnings=(
-                *((_missing(recovery),) if recovery.lost else ()),
-                *problems,
-                *loop.warnings,
-                *info.notes,
-            ),
+            warnings=(*((_missing(recovery),) if recovery.lost else ()), *problems, *loop.warnings, *info.notes),
             device_lost_timestamp=self._epoch_s(recovery.lost_s) if recovery.lost else 0.0,
             next_try_timestamp=self._epoch_s(recovery.next_try_s) if recovery.lost else 0.0,
             fault_code=self._fault.code if self._fault else 0,

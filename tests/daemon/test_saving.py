@@ -183,6 +183,24 @@ def test_a_file_whose_checks_fail_in_an_unknown_way_is_told_and_the_next_save_is
         assert law_in(watcher) == "tdpa"
 
 
+def test_what_was_saved_while_the_file_of_before_was_checked_is_all_that_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A law may take seconds to be imported: a reload that was asked for meanwhile was undone until the next look."""
+    file = tmp_path / "lab.toml"
+    file.write_text(OLD)
+    with watched(file) as watcher:
+
+        def slow(text: str, name: str) -> LoadedConfig:
+            if "0.1" in text:
+                renamed_over(file, NEW)
+            return parse(text, name)
+
+        monkeypatch.setattr(file_watch, "parse", slow)
+        renamed_over(file, OLD + "[safety]\nramp_s = 0.1\n")
+        assert law_in(watcher) == "tdpa"
+
+
 def test_a_file_that_is_empty_or_away_is_no_save(tmp_path: Path) -> None:
     """An emptied file would be a usable configuration, without a wall: it is one that somebody is about to write."""
     file = tmp_path / "lab.toml"
