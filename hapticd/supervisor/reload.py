@@ -13,7 +13,6 @@ from typing import Any, Final
 from hapticd.config.file import read
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.config.problems import key_path, shown_value
-from hapticd.device import DeviceInfo
 from hapticd.errors import ConfigError, HapticdError
 from hapticd.keys.policy import key_ring
 from hapticd.supervisor.file_watch import FileWatcher
@@ -67,27 +66,31 @@ class Reload:
             return
         state = self._state
         if self._reading is None and state.reload_asked:
-            answers, state.reload_asked = state.reload_asked, []
-            self._read(answers)
+            self._answers, state.reload_asked = state.reload_asked, []
+            try:
+                self._reading = _Reading(state.config.path)
+            except RuntimeError:
+                answers, self._answers = self._answers, []
+                self._refuse(f"{state.config.path}: cannot be read: {_NO_THREAD}", answers)
+                return
         if self._reading is not None:
             read_now = self._reading.outcome
             if read_now is None:
                 if time.monotonic() < self._reading.give_up_s:
                     return
                 read_now = HapticdError(f"{state.config.path}: could not be checked within {CHECK_S:g} s")
-            tried = self._reading.device is not None
             answers, self._answers, self._reading = self._answers, [], None
             if isinstance(read_now, HapticdError):
                 self._refuse(str(read_now), answers)
             else:
-                self._begin(read_now, answers, tried)
+                self._begin(read_now, answers)
             return
         self._follow()
         saved = self._watcher.take() if self._watcher is not None else None
         if isinstance(saved, ConfigError):
             self._refuse(str(saved), [])
         elif saved is not None and saved.text != state.config.text:
-            self._begin(saved, [], tried=False)
+            self._begin(saved, [])
 
     def close(self) -> None:
         """Look at the file no more; the daemon ends."""
@@ -99,17 +102,7 @@ class Reload:
             self._watcher.close()
             self._watcher.wait_closed()
 
-    def _read(self, answers: list[Answer], device: DeviceInfo | None = None) -> None:
-        """Begin to read the file, and to try it on this device."""
-        path = self._state.config.path
-        try:
-            self._reading = _Reading(path, device)
-        except RuntimeError:
-            self._refuse(f"{path}: cannot be read: {_NO_THREAD}", answers)
-        else:
-            self._answers = answers
-
-    def _begin(self, wanted: LoadedConfig, answers: list[Answer], tried: bool) -> None:
+    def _begin(self, wanted: LoadedConfig, answers: list[Answer]) -> None:
         state = self._state
         state.notifier.send("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
         problems = [*needs_restart(state.config, wanted)]
@@ -119,9 +112,6 @@ class Reload:
             problems.append(str(error))
         if problems:
             self._refuse("\n".join(problems), answers)
-            return
-        if state.recovery.lost and not tried:  # no loop is there to say that it cannot run it
-            self._read(answers, state.loop.info)
             return
 
         def finish(verdict: str) -> None:
@@ -145,14 +135,16 @@ class Reload:
             other_law = not same_law(state.config, wanted)
             state.recovery.amend(replace(resume, law=resume.law + other_law))
             state.recovery.hurry()
-            state.tell(EventCode.SWITCHED, f"configuration {wanted.hash}: in force when the device is back")
+            text = f"configuration {wanted.hash}: in force when the device is back"
+            state.tell(EventCode.SWITCHED, text)
             finish("")
         else:
             state.requests.submit(switch_request(state.config, wanted), finish)
 
     def _refuse(self, why: str, answers: list[Answer]) -> None:
         state = self._state
-        state.tell(EventCode.REFUSED, f"configuration refused, nothing changed: {why}")
+        text = f"configuration refused, nothing changed: {why}"
+        state.tell(EventCode.REFUSED, text)
         state.ready_due = True
         for answer in answers:
             answer(why)
@@ -171,19 +163,13 @@ class Reload:
 class _Reading(threading.Thread):
     """A file read and checked in a thread of its own: to check a law is to import it, which may take its time.
 
-    Args:
-        path: the file.
-        device: to try it on, as a loop would; None: not to.
-
     Attributes:
-        device: the same.
         outcome: what it says, or why it cannot be used; None as long as that is not known.
         give_up_s: until when there should be one, on CLOCK_MONOTONIC [s].
     """
 
-    def __init__(self, path: Path, device: DeviceInfo | None) -> None:
+    def __init__(self, path: Path) -> None:
         super().__init__(name="reload", daemon=True)
-        self.device = device
         self.outcome: LoadedConfig | HapticdError | None = None
         self.give_up_s = time.monotonic() + CHECK_S
         self._path = path
@@ -191,13 +177,7 @@ class _Reading(threading.Thread):
 
     def run(self) -> None:
         try:
-            loaded = parse(read(self._path, files_only=True), str(self._path))
-            if self.device is not None:
-                from hapticd.loop.warm_up import warm_up  # a daemon that has its device needs none of it
-                from hapticd.tick.assemble import make_tick
-
-                warm_up(make_tick(loaded, self.device))
-            self.outcome = loaded
+            self.outcome = parse(read(self._path, files_only=True), str(self._path))
         except HapticdError as error:
             self.outcome = error
         except Exception as error:  # noqa: BLE001 - whatever a plug-in's checks raise, a verdict has to come

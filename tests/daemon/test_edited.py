@@ -8,15 +8,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
-
 from hapticd.config.loading import load
 from hapticd.loop.resume import FROM_START
 from hapticd.loop.sources import edited, loaded
 from hapticd.paths import directory
 from hapticd.shapes.field import Field
 from hapticd.tick.event import EventCode
-from tests.daemon.running import Subscriber
 from tests.faults.rig import Rig, anew_where_late, events_until
 
 SOFT = '[controller]\nlaw = "mylab.soft"\n'
@@ -93,34 +90,6 @@ def test_a_reload_while_the_device_is_away_brings_another_law_and_no_edited_one(
         rig.pressing()
         edit(rig, "other")
         stays_disarmed(rig, away(rig, lambda: reload(other + "# saved\n")), "law mylab.other")
-
-
-@pytest.mark.parametrize("saved", [False, True])
-@anew_where_late
-def test_a_reload_while_the_device_is_away_to_a_law_that_cannot_start_is_refused(saved: bool) -> None:
-    """It was answered with ok, and no loop could begin."""
-    with Rig(laws={"unable": "pass"}, more="[service]\nreload_on_save = true" if saved else "") as rig:
-        rig.pressed()
-        file = rig.directory / "mylab/unable.py"
-        file.write_text(file.read_text().replace("state.asked = 0", "1 / 0"))
-        before = rig.config
-
-        def reload(subscriber: Subscriber) -> str:
-            rig.daemon.config.write_text(before + '\n[controller]\nlaw = "mylab.unable"\n')
-            if not saved:
-                refused = rig.ask("reload", wait=True)
-                assert not refused["ok"]
-                return str(refused["text"])
-            return str(events_until(subscriber, EventCode.REFUSED)[-1]["text"])
-
-        with rig.subscriber() as subscriber:
-            rig.order("unplugged")
-            events_until(subscriber, EventCode.DEVICE_LOST)
-            assert "law mylab.unable cannot start: ZeroDivisionError" in reload(subscriber)
-            rig.daemon.config.write_text(before)
-            rig.mend()
-            events_until(subscriber, EventCode.STARTED)
-        rig.goes_on("arm")
 
 
 def test_a_field_that_was_edited_since_it_was_read_does_not_arm_itself(tmp_path: Path) -> None:
