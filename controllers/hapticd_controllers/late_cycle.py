@@ -44,7 +44,8 @@ MEMORY = 0.998  # share of the felt mass's evidence that a new sample leaves sta
 SHARE_OF_MASS = 1.0  # most damping in m/dt: a sampled damper is itself unstable from 2, smoothed velocity or not
 LATE_SHARE_OF_MASS = 0.35  # the same where the device applies forces one sample late: from 0.83
 MOST = 300.0  # most damping whatever was felt: a hand that moves is easily taken for a mass [N s/m]
-NEW_SPEED = 0.5  # share of the newest sample in the velocity that is damped
+NEW_SPEED = 0.5  # least share of the newest sample in the velocity that is damped
+SMOOTH_S = 0.001  # from twice this on a longer sample has more: half of one of 10 ms is a delay, and shakes [s]
 EASE_S = 0.01  # in which a damping comes into force, to 63 %: at 1 m/s at once it is a jump of its whole force [s]
 AGAIN = 2.0  # times what is missing that a force's second cycle in a row adds: one swing of it takes half a second
 SPRING_WAITS = 2.0  # cycles of a spring that are let pass after a change: what swings there began before it
@@ -125,7 +126,8 @@ def step(state: Any, params: Any, tick: Any) -> float:
         state.eased_n_s_per_m = 0.0
         state.velocity_m_per_s = 0.0
         return 0.0
-    state.velocity_m_per_s += NEW_SPEED * (tick.velocity_m_per_s - state.velocity_m_per_s)
+    newest = max(NEW_SPEED, 1.0 - SMOOTH_S / tick.dt_s)
+    state.velocity_m_per_s += newest * (tick.velocity_m_per_s - state.velocity_m_per_s)
     share = tick.dt_s / (EASE_S + tick.dt_s)
     state.eased_n_s_per_m += share * (state.damping_n_s_per_m - state.eased_n_s_per_m)
     force_n: float = tick.contact_n - state.eased_n_s_per_m * state.velocity_m_per_s
