@@ -192,16 +192,16 @@ def _forget(state: Any) -> None:
 
 
 def _bound(state: Any, params: Any, tick: Any) -> None:
-    """No less than the spring's base, and no more than the device bears."""
+    """No less than the spring's base, but of that as well no more than the device bears."""
     keep_period(state, tick.dt_s)
     most: float = params.most_unfelt_n_s_per_m
     if state.felt_mass_kg > 0.0:
         share = LATE_SHARE_OF_MASS if state.forces_late else SHARE_OF_MASS
         most = share * state.felt_mass_kg / state.period_s
-    state.damping_n_s_per_m = min(state.damping_n_s_per_m, most, MOST)
     if tick.in_contact and tick.spring_n != 0.0:
         base = min(params.most_base_n_s_per_m, params.base_s * _bounded(tick.spring_n / -tick.x_m))
         state.damping_n_s_per_m = max(state.damping_n_s_per_m, base)
+    state.damping_n_s_per_m = min(state.damping_n_s_per_m, most, MOST)
 
 
 def _bounded(value: float) -> float:

@@ -181,25 +181,42 @@ def test_one_count_of_the_position_kicks_by_half_of_what_it_would() -> None:
     assert port.go(1e-5, 0.0, 2000.0) == pytest.approx(-0.5 * 30.0 * 1e-2)
 
 
-@pytest.mark.parametrize(("period_s", "stiffness_n_per_m"), [(0.01, 1500.0), (0.005, 4000.0)])
-def test_a_velocity_of_slow_samples_is_smoothed_for_no_longer_than_one_of_quick_ones(
-    period_s: float, stiffness_n_per_m: float
-) -> None:
+def rest_m(mass_kg: float, damping_n_s_per_m: float, stiffness_n_per_m: float, period_s: float, late: int = 0) -> float:
+    """How far a device moves in the last 50 of 4 s, pushed with 1 N against a spring whose forces come samples late."""
     port = Port()
     tick = port.tick
     tick.dt_s, tick.in_contact = period_s, True
     x_m = v_m_per_s = 0.0
-    path = []
+    path, asked_n = [], [0.0] * (1 + late)
     for _ in range(round(4.0 / period_s)):
         before_m = x_m
         for _ in range(50):
-            v_m_per_s += (tick.applied_n + 1.0 - 4.4 * v_m_per_s) / 0.25 * period_s / 50
+            pushed_n = asked_n[-1 - late] + 1.0 - damping_n_s_per_m * v_m_per_s
+            v_m_per_s += pushed_n / mass_kg * period_s / 50
             x_m += v_m_per_s * period_s / 50
         path.append(x_m)
         tick.moved_m, tick.velocity_m_per_s, tick.x_m = x_m - before_m, (x_m - before_m) / period_s, x_m
         tick.spring_n = tick.contact_n = tick.applied_contact_n = -stiffness_n_per_m * x_m
         tick.applied_n = max(-6.0, min(6.0, late_cycle.step(port.state, port.params, tick)))
-    assert max(path[-50:]) - min(path[-50:]) < 1e-5
+        asked_n.append(tick.applied_n)
+    return max(path[-50:]) - min(path[-50:])
+
+
+@pytest.mark.parametrize(("period_s", "stiffness_n_per_m"), [(0.01, 1500.0), (0.005, 4000.0)])
+def test_a_velocity_of_slow_samples_is_smoothed_for_no_longer_than_one_of_quick_ones(
+    period_s: float, stiffness_n_per_m: float
+) -> None:
+    assert rest_m(0.25, 4.4, stiffness_n_per_m, period_s) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("mass_kg", "stiffness_n_per_m", "late"), [(0.03, 2000.0, 1), (0.075, 3500.0, 1), (0.02, 4e3, 0)]
+)
+def test_the_base_of_a_spring_is_no_more_than_a_light_device_bears(
+    mass_kg: float, stiffness_n_per_m: float, late: int
+) -> None:
+    """It shook from limit to limit."""
+    assert rest_m(mass_kg, 0.3, stiffness_n_per_m, 1e-3, late) < 1e-4
 
 
 def test_there_is_an_end_to_damping_whatever_mass_is_felt() -> None:
