@@ -254,7 +254,8 @@ def _end(
     state: Any, params: Any, half_s: float, length_m: float, whole: bool, turn_m: float, stiffness: float, dt_s: float
 ) -> None:
     """A swing has ended: whose was it, does the contact need more base, does it need a brake?"""
-    half_s *= sqrt(max(0.0, 1.0 - state.brake * state.brake))  # a braked swing takes longer than a free one
+    if state.brake < 1.0:  # a braked swing takes longer than a free one; beyond it the contact does not swing
+        half_s *= sqrt(1.0 - state.brake * state.brake)
     even = _even(state, half_s, turn_m, dt_s)
     shrinks = length_m < SHRINKS * state.older_m
     loud = length_m > LOUD * turn_m

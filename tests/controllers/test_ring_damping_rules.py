@@ -131,6 +131,15 @@ def test_two_half_periods_without_a_turn_are_silence() -> None:
     assert before_s <= 2.0 * last_s < before_s + DT_S
 
 
+@pytest.mark.parametrize("ratio", [0.99, 1.0, 1.5])
+def test_silence_ends_a_critical_brake_as_any_other(ratio: float) -> None:
+    """Its swing counted as one of no time, and silence is told by how long a swing takes: it stayed for good."""
+    shown = Shown(Params(brake_ratio=ratio))
+    assert shown.swing(3)[-1].brake == pytest.approx(ratio)
+    shown.rest(5000)
+    assert shown.state.brake == 0.0
+
+
 @pytest.mark.parametrize(("counts", "brakes"), [(3, False), (4, True)])
 def test_a_swing_below_two_turn_thresholds_is_not_braked(counts: int, brakes: bool) -> None:
     """A threshold is 1.6 counts."""
