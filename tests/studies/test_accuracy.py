@@ -356,6 +356,7 @@ def test_the_command_writes_everything_and_prints_a_screen(tmp_path: Path, capsy
         (["--duration", "0"], "--duration 0"),
         (["--duration", "inf"], "--duration inf"),
         (["--config", str(directory("config") / "omega7.toml")], "only a simulated device"),
+        (["--config", str(directory("config") / "ball.toml")], "device.options.axes = 3: only a device of one axis"),
         (["--output", "/proc/nowhere"], "--output /proc/nowhere"),
     ],
 )

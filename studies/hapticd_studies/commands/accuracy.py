@@ -45,6 +45,8 @@ def command(
     from hapticd.offline.rehearsal import simulation_options
 
     options = simulation_options(loaded)
+    if options.axes > 1:
+        raise ConfigError(f"device.options.axes = {options.axes}: only a device of one axis is measured here")
     for key in ("force_delay_s", "flexible"):
         if getattr(options, key):
             raise ConfigError(f"device.options.{key}: is stepped exactly only; take it out to compare integrators")
