@@ -121,7 +121,7 @@ def without_push(config: LoadedConfig, simulated: bool = False) -> LoadedConfig:
         config: the user's own.
         simulated: with the simulated device in the place of the configuration's.
     """
-    table = tomllib.loads(config.text)
+    table = tomllib.loads(config.text.removeprefix("\ufeff") + "\n")
     made: dict[str, Any] = {name: table[name] for name in _TABLES if name in table}
     made["loop"] = {**made.get("loop", {}), "law_budget": 1.0}  # it is measured, not judged
     made["safety"] = {**table.get("safety", {}), "profile": "device", "max_force_n": MOST_N}

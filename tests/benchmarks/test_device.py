@@ -84,7 +84,7 @@ def test_a_device_that_may_not_be_armed_is_read_and_says_why(
 
 def test_what_runs_has_the_device_the_rate_and_the_law_of_the_file_and_no_scene() -> None:
     options = 'options.model = "omega7"\noptions.max_force_n = 5.0'
-    loaded = parse(LAB.format(driver="loopback", device=options), "lab.toml")
+    loaded = parse("\ufeff" + LAB.format(driver="loopback", device=options), "lab.toml")  # as Windows writes it
     for simulated in (False, True):
         made = without_push(loaded, simulated).config
         assert (made.loop.rate_hz, made.controller.law, made.device.driver) == (500.0, "tdpa", "loopback")

@@ -103,6 +103,7 @@ def test_each_term_of_a_shipped_configuration_goes_alone(name: str) -> None:
         '[device]\noptions = { model = "omega7", changes = [{ at_s = 1.0, coulomb_n = 0.1, mass_kg = 0.3 }] }',
         '[device.options]\nmodel = "falcon"\n[[device.options.changes]]\nat_s = 1.0\ncoulomb_n = 0.1\n',
         "",
+        "\ufeff[device.options]\r\ncoulomb_n = 0.1\r\n",
         "[device.options.hand]\ndamping_n_s_per_m = 2.0\n"
         "[[device.options.changes]]\nat_s = 0.5\nhand_damping_n_s_per_m = 3.0",
         '[velocity]\nestimator = "lowpass"\n'

@@ -182,6 +182,12 @@ def test_the_configuration_of_the_press_can_be_ones_own_and_be_changed(tmp_path:
     assert "mass_kg = 0.4" in found["press"]
 
 
+def test_a_configuration_of_windows_can_be_changed() -> None:
+    """Whose editors put a mark before the text."""
+    changed = with_values("\ufeff[loop]\r\nrate_hz = 500\r\n", "own.toml", ["loop.priority=70"], {})
+    assert parse(changed, "own.toml").config.loop.rate_hz == 500.0
+
+
 # --- interruptions ---------------------------------------------------------------------------------------------------
 
 

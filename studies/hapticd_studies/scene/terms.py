@@ -42,7 +42,7 @@ def reduced(loaded: LoadedConfig, terms: Sequence[Term]) -> LoadedConfig:
     Raises:
         ConfigError: it would not be one any more.
     """
-    document = tomlkit.parse(loaded.text)
+    document = tomlkit.parse(loaded.text.removeprefix("\ufeff"))
     for term in sorted(terms, key=lambda one: one.order):
         term.edit(document)
     return parse(tomlkit.dumps(document), str(loaded.path))

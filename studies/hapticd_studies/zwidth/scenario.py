@@ -93,7 +93,7 @@ def with_values(text: str, name: str, given: Sequence[str], keys: dict[str, str]
         ConfigError: it is no assignment, or there is no such place.
     """
     try:
-        data = tomllib.loads(text)
+        data = tomllib.loads(text.removeprefix("\ufeff") + "\n")
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{name}: not TOML: {error}") from None
     for one in given:
