@@ -257,6 +257,7 @@ REFUSED: dict[str, tuple[Sequence[str], str]] = {
         "give delay to --y",
     ),
     "no time": (["--duration", "0"], "--duration 0: must be more than 0 s"),
+    "a time without end": (["--duration", "1e300"], "duration = 1e+300 s: must be at least one period"),
     "an unknown law": (["--laws", "nolaw"], "no law 'nolaw'"),
     "an unknown parameter of a law": (["--laws", "tdpa:cap=3"], "cap = 3: unknown key"),
     "a value that a law refuses": (["--laws", "energy-cycle:cap=maybe"], "must be"),

@@ -60,6 +60,7 @@ def command(
     require_cluster(cluster)
 
     from hapticd.offline.outcome import Criterion
+    from hapticd.offline.rehearsal import ticks_in
     from hapticd_studies.grid.run import kept, run
     from hapticd_studies.law_spec import parse_laws
     from hapticd_studies.zwidth.plane import QUANTITIES, parse_axis
@@ -84,6 +85,7 @@ def command(
     name = str(loaded.path)
     text = with_values(loaded.text, name, assign or [], {key: one.key for key, one in QUANTITIES.items()})
     loaded = parse(text, name)
+    ticks_in(loaded, duration)  # refuses a time without end
     changed = changing(scenario_of(loaded))
     for axis, option in ((across, f"--x {x}"), (upwards, f"--y {y}")):
         if axis.quantity.key in changed:
