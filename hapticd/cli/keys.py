@@ -13,7 +13,7 @@ import typer
 from hapticd.cli.group import Overview
 from hapticd.errors import ConfigError
 from hapticd.keys.file import Key, is_key, new_pair, read, write, written
-from hapticd.keys.store import SECRET, KeyDirectory, key_directory
+from hapticd.keys.store import NAME, SECRET, KeyDirectory, key_directory
 
 app = typer.Typer(
     cls=Overview,
@@ -42,9 +42,8 @@ def keys(
     if as_json:
         listed = [{"name": name, "key": key.public, "watch_only": key.watch_only} for name, key in clients.items()]
         server_key = pair.public if pair is not None else None
-        typer.echo(
-            json.dumps({"directory": str(directory.path), "server_key": server_key, "clients": listed}, indent=2)
-        )
+        told = {"directory": str(directory.path), "server_key": server_key, "clients": listed}
+        typer.echo(json.dumps(told, indent=2))
         return
     typer.echo(f"{directory.path}")
     if pair is not None:
@@ -163,8 +162,8 @@ def _given(text: str) -> Key:
 
 
 def _file_of(name: str) -> Path:
-    if Path(name).name != name:
-        raise ConfigError(f"{name!r}: a name, not a path; the file goes into the present directory")
+    if NAME.fullmatch(name) is None:
+        raise ConfigError(f"{name!r}: a client's name has letters, digits and _ . - only, at most 64, and is no path")
     return Path(f"{name}{SECRET}")
 
 

@@ -20,11 +20,12 @@ CLIENTS = "clients"
 """Name of the directory of listed clients."""
 SECRET = ".key_secret"
 """Ending of a file with a secret key."""
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+"""What a client may be called."""
 
 _SERVER = f"server{SECRET}"
 _PUBLIC = ".key"
 _GROUP = "hapticd"
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +162,7 @@ class KeyDirectory:
             raise _denied(listed[name], error) from error
 
     def _client(self, name: str) -> Path:
-        if _NAME.fullmatch(name) is None:
+        if NAME.fullmatch(name) is None:
             raise ConfigError(f"{name!r}: a client's name has letters, digits and _ . - only, at most 64")
         return self.path / CLIENTS / f"{name}{_PUBLIC}"
 
