@@ -95,7 +95,7 @@ class Installation:
     ) -> None:
         self.root = root.absolute()
         self.packaged = prefix != PACKAGE and self._at(PACKAGE / "lib/systemd/system" / UNITS[0]).exists()
-        self.prefix = PACKAGE if self.packaged else prefix or _OWN
+        self.prefix = PACKAGE if self.packaged else (prefix or _OWN).absolute()
         self._library, self._link_path = self.prefix / "lib", self.prefix / "bin/hapticd"
         self._shared = shared
         self.live = self.root == Path("/")

@@ -71,6 +71,12 @@ def test_every_file_of_the_service_goes_to_its_place_readable_by_all(tmp_path: P
     assert stat.S_IMODE((tmp_path / "etc/hapticd").stat().st_mode) == 0o755
 
 
+def test_a_prefix_counts_from_where_one_is_as_a_root_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir("/")
+    Installation(tmp_path, prefix=Path("opt/lab")).install(silent)
+    assert (tmp_path / "opt/lab/lib/systemd/system/hapticd.service").is_file()
+
+
 def test_the_units_run_the_hapticd_that_installed_them(tmp_path: Path) -> None:
     installed(tmp_path, "/srv/lab/bin/hapticd")
     unit = (tmp_path / "usr/local/lib/systemd/system/hapticd@.service").read_text()

@@ -201,6 +201,10 @@ def test_a_file_that_is_no_mesh_is_one_clear_line(
     assert err.count("\n") == 1
 
 
+def test_a_folder_is_no_mesh(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, Path())[::2] == (2, "hapticd: .: must end in .stl or .obj\n")
+
+
 def test_a_scale_makes_metres_of_millimetres(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = saved(tmp_path, trimesh.creation.box((40.0, 30.0, 20.0)))
     status, out, _ = run(capsys, path, "--scale", 0.001, "--json")

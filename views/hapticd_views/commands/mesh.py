@@ -46,7 +46,7 @@ def command(
     for option, value in (("--scale", scale), ("--voxel", voxel)):
         if value is not None and not 0.0 < value < math.inf:
             raise ConfigError(f"{option} {value:g}: must be above 0")
-    path = output or file.with_suffix(".field")
+    path = output or file.parent / f"{file.stem}.field"
     place(path, overwrite)
     mesh = read_mesh(file, scale)
     spacing_m = max(mesh.size_m) / _ALONG if voxel is None else voxel
