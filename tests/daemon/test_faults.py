@@ -310,8 +310,8 @@ def test_who_stops_a_daemon_whose_lost_loop_hangs_hears_what_became_of_the_force
         rig.order("swapped")  # for whoever opens it from now on
         why = "the device could not be opened: found faulty 2 (x) instead of faulty 1 (x)"
         assert rig.ask("stop") == {"ok": False, "text": f"the force may still be there: {why}; switch the device off"}
-        assert why in rig.daemon.output()
         assert rig.daemon.wait_exit() == 1
+        assert why in rig.daemon.output()
 
 
 @anew_where_late
