@@ -143,7 +143,7 @@ def test_a_file_that_cannot_be_used_changes_nothing_and_names_the_place(
         assert named in answer.stderr
         assert "Traceback" not in answer.stderr
         refused = subscriber.until("hapticd/event", code=EventCode.REFUSED)
-        assert f"WARNING {refused['text']}" in daemon.output()
+        wait_until(lambda: f"WARNING {refused['text']}" in daemon.output(), "the log")
         after = subscriber.until("hapticd/status")
         assert after["config_hash"] == before["config_hash"]
         assert after["armed"]

@@ -109,7 +109,7 @@ def test_what_was_let_go_stays_so_until_it_is_armed_also_by_a_daemon_that_is_sta
         rig.daemon.again()
         status = rig.ask("status")["status"]
         assert (status["armed"], HELD in str(status["warnings"])) == (False, True)
-        assert HELD in rig.daemon.output()
+        wait_until(lambda: HELD in rig.daemon.output(), "the log")
         rig.goes_on("arm")
         assert HELD not in str(rig.ask("status")["status"]["warnings"])
         armed(rig)

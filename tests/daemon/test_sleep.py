@@ -9,7 +9,7 @@ import pytest
 from hapticd.client.commands import command
 from hapticd.supervisor.sleep import SleepWatch
 from hapticd.tick.event import EventCode
-from tests.daemon.running import Daemon, Subscriber
+from tests.daemon.running import Daemon, Subscriber, wait_until
 from tests.daemon.test_deaths import PRESSED, pressing
 from tests.faults.rig import events_until
 
@@ -40,7 +40,7 @@ def test_a_computer_that_slept_goes_on_disarmed_until_it_is_armed_again(
             slept.with_suffix(".new").replace(slept)
             events_until(subscriber, EventCode.DISARMED)
             assert subscriber.until("hapticd/status", armed=False, releasing=False)
-            assert "slept for 3.0 s" in daemon.output()
+            wait_until(lambda: "slept for 3.0 s" in daemon.output(), "the log")
             command("arm")
             assert subscriber.until("hapticd/status", armed=True)
             assert daemon.output().count("slept") == 1
