@@ -11,7 +11,6 @@ from __future__ import annotations
 import gc
 import os
 import signal
-import tomllib
 from array import array
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -19,6 +18,7 @@ from typing import Any
 
 import tomlkit
 
+from hapticd.config.file import table_of
 from hapticd.config.loading import LoadedConfig, parse
 from hapticd.errors import HapticdError
 from hapticd.loop.realtime import become_realtime, die_with_parent, sleep_until
@@ -121,7 +121,7 @@ def without_push(config: LoadedConfig, simulated: bool = False) -> LoadedConfig:
         config: the user's own.
         simulated: with the simulated device in the place of the configuration's.
     """
-    table = tomllib.loads(config.text.removeprefix("\ufeff") + "\n")
+    table = table_of(config.text)
     made: dict[str, Any] = {name: table[name] for name in _TABLES if name in table}
     made["loop"] = {**made.get("loop", {}), "law_budget": 1.0}  # it is measured, not judged
     made["safety"] = {**table.get("safety", {}), "profile": "device", "max_force_n": MOST_N}

@@ -15,7 +15,7 @@ from hapticd.cli.remote import Instance
 from hapticd.client.commands import RefusedConfigError, command
 from hapticd.client.edited import put_into_force
 from hapticd.config.editing import with_law
-from hapticd.config.file import read, replace
+from hapticd.config.file import read, replace, table_of
 from hapticd.config.plugin_tables import ControllerConfig
 from hapticd.config.problems import shown_value
 from hapticd.errors import ConfigError
@@ -121,7 +121,7 @@ def _changes(before: str, after: str) -> list[str]:
 
 
 def _controller(text: str) -> dict[str, Any]:
-    table = tomllib.loads(text.removeprefix("\ufeff")).get("controller", {})
+    table = table_of(text).get("controller", {})
     params = table.get("params", {})
     law = {"controller.law": table.get("law", ControllerConfig().law)}
     return {**law, **{f"controller.params.{key}": value for key, value in params.items()}}

@@ -11,6 +11,7 @@ import tomlkit
 from tomlkit.container import Container
 from tomlkit.items import Comment, InlineTable, Null, Table, Whitespace
 
+from hapticd.config.file import table_of
 from hapticd.config.loading import parse
 from hapticd.config.plugin_tables import ControllerConfig
 from hapticd.config.values import put
@@ -41,7 +42,7 @@ def with_law(text: str, name: str, law: str, params: dict[str, Any]) -> str:
     mark = _BOM if text.startswith(_BOM) else ""
     text = text.removeprefix(_BOM)
     try:
-        data = tomllib.loads(f"{text}\n")  # as `parse` reads it
+        data = table_of(text)
     except (ValueError, RecursionError):
         parse(text, name)  # says where
         raise
@@ -82,7 +83,7 @@ def with_edits(text: str, name: str, values: Mapping[str, Any]) -> str:
     mark = _BOM if text.startswith(_BOM) else ""
     text = text.removeprefix(_BOM)
     try:
-        data = tomllib.loads(f"{text}\n")
+        data = table_of(text)
         document: Any = tomlkit.parse(text)
     except (ValueError, RecursionError):
         parse(text, name)  # says where

@@ -7,12 +7,24 @@ import os
 import shutil
 import stat
 import tempfile
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from hapticd.errors import ConfigError
 from hapticd.replacing import obstacle, put
 
 _LARGEST = 1 << 20
+
+
+def table_of(text: str) -> dict[str, Any]:
+    """What the text of a configuration says, as far as TOML goes; Windows' editors begin one with a mark.
+
+    Raises:
+        ValueError: it is no TOML.
+        RecursionError: its tables lie too deep in each other.
+    """
+    return tomllib.loads(text.removeprefix("\ufeff") + "\n")
 
 
 def read(path: Path | str, *, files_only: bool = False) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import hashlib
 import re
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from hapticd import plugins
-from hapticd.config.file import read
+from hapticd.config.file import read, table_of
 from hapticd.config.models import Config
 from hapticd.config.objects import MeshObject
 from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig, RemoteLawTable
@@ -184,7 +183,7 @@ def _table(text: str, name: str, problems: Problems) -> dict[str, Any]:
 
 def _toml(text: str, name: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text.removeprefix("\ufeff") + "\n")
+        return table_of(text)
     except RecursionError:
         raise _too_deep(name) from None
     except ValueError as error:  # TOMLDecodeError, and what tomllib lets through: a number of more than 4300 digits

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 import re
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
+from hapticd.config.file import table_of
 from hapticd.config.plugin_tables import ControllerConfig, DeviceConfig, RemoteLawTable
 from hapticd.config.problems import shown_value
 from hapticd.errors import ConfigError
@@ -37,7 +37,7 @@ def with_values(text: str, name: str, values: Mapping[str, Any]) -> str:
     """
     import tomlkit  # nothing that runs needs it, and it takes long to import
 
-    data = tomllib.loads(text.removeprefix("\ufeff") + "\n")
+    data = table_of(text)
     for key in sorted(values, key=lambda key: key not in _PLUGINS):
         if key in _PLUGINS:
             table, (owned, default) = data.setdefault(key.partition(".")[0], {}), _PLUGINS[key]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from hapticd.config.file import read
+from hapticd.config.file import read, table_of
 from hapticd.config.loading import LoadedConfig, load
 from hapticd.config.models import Config, LoopConfig
 from hapticd.config.plugin_tables import DeviceConfig
@@ -69,7 +68,7 @@ def _salvaged(path: Path) -> tuple[LoopConfig, str, dict[str, str]]:
     tables = {}
     with contextlib.suppress(ConfigError, ValueError, RecursionError):
         # A pipe has said all that it says when it was read the first time, and a second reader might wait for ever.
-        data = tomllib.loads(read(path, files_only=True).removeprefix("\ufeff"))
+        data = table_of(read(path, files_only=True))
         tables = {name: table for name, table in data.items() if isinstance(table, dict)}
     with contextlib.suppress(ValidationError):
         loop = LoopConfig.model_validate(tables.get("loop", {}))

@@ -133,7 +133,7 @@ def test_two_half_periods_without_a_turn_are_silence() -> None:
 
 @pytest.mark.parametrize("ratio", [0.99, 1.0, 1.5])
 def test_silence_ends_a_critical_brake_as_any_other(ratio: float) -> None:
-    """Its swing counted as one of no time, and silence is told by how long a swing takes: it stayed for good."""
+    """A swing under it counted as 0 s long, and silence is told by the last swing: it never came."""
     shown = Shown(Params(brake_ratio=ratio))
     assert shown.swing(3)[-1].brake == pytest.approx(ratio)
     shown.rest(5000)

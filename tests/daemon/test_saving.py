@@ -186,7 +186,7 @@ def test_a_file_whose_checks_fail_in_an_unknown_way_is_told_and_the_next_save_is
 def test_what_was_saved_while_the_file_of_before_was_checked_is_all_that_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A law may take seconds to be imported: a reload that was asked for meanwhile was undone until the next look."""
+    """The import of a law takes seconds; a newer file that was reloaded meanwhile was replaced by the older one."""
     file = tmp_path / "lab.toml"
     file.write_text(OLD)
     with watched(file) as watcher:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import tomlkit
 
+from hapticd.config.file import table_of
 from hapticd.config.loading import LoadedConfig
 from hapticd.config.values import put
 from hapticd.config.walls import WallConfig
@@ -93,7 +94,7 @@ def with_values(text: str, name: str, given: Sequence[str], keys: dict[str, str]
         ConfigError: it is no assignment, or there is no such place.
     """
     try:
-        data = tomllib.loads(text.removeprefix("\ufeff") + "\n")
+        data = table_of(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{name}: not TOML: {error}") from None
     for one in given:
